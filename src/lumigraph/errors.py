@@ -1,4 +1,4 @@
-"""What lumigraph raises and warns: one base class, children only where a caller would act differently.
+"""Errors and warnings of lumigraph: one base class, children only where a caller would act differently.
 
 Every message says what is wrong, with both values and their units, then what to do.
 """

@@ -124,8 +124,8 @@ def test_the_start_knows_the_scenes_own_defocus():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"object": "volume"}, "stands a 'picture'"),
-        ({"object": "beads"}, "stands a 'picture'"),
+        ({"object": "volume"}, "need a 'picture'"),
+        ({"object": "beads"}, "need a 'picture'"),
         ({"depths": (0.0, 1e-3)}, "there are 2 depths but a picture stands at one"),
         ({"terms": (1, 2, 3)}, "the picture explains 1 to 3 itself"),
         ({"regions": (2, 2)}, "a picture has one"),

@@ -101,7 +101,7 @@ def test_views_shift_by_the_wavefronts_slopes():
     ("given", "message"),
     [
         ({"instrument": SCOPE.replace(configuration="2.0", lenslet_offset="1 mm")}, "configuration '1.0'"),
-        ({"instrument": lg.load_camera("thesis-plenoptic-2-m050")}, "are those of a PlenopticCamera or"),
+        ({"instrument": lg.load_camera("thesis-plenoptic-2-m050")}, "only a PlenopticCamera or"),
         ({"terms": (3, 6)}, "the scene's place explains 1 to 3"),
         ({"terms": ()}, "Give others"),
         ({"raw": np.ones((135, 134), np.float32)}, "the instrument's"),

@@ -367,7 +367,7 @@ def test_what_the_middle_view_does_not_show_is_unknown(paint):
 
 def test_places_beyond_the_range_asked_for_are_told(paint):
     views, _ = views_of([(paint[0], flat(0.4), None)])
-    with pytest.warns(SamplingWarning, match=r"places lie beyond the disparities asked for, -1 to 0 px"):
+    with pytest.warns(SamplingWarning, match=r"places lie beyond the given disparities, -1 to 0 px"):
         epi(views, (-1, 0))
 
 

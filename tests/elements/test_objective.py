@@ -198,8 +198,8 @@ def test_the_radius_of_a_part_of_the_light_is_that_of_airys_pattern(part):
     [
         ({"numerical_aperture": 1.4}, "aperture 1.4 is not below the refractive index 1.33"),
         ({"model": "ray"}, "model is 'ray' but must be one of scalar, vector, paraxial, rays"),
-        ({"model": "rays", "aberrations": {11: 0.1}}, "model 'rays' knows no aberrations"),
-        ({"model": "rays", "image_defocus": 1e-6}, "model 'rays' knows no .* lenslet offset"),
+        ({"model": "rays", "aberrations": {11: 0.1}}, "model 'rays' has no aberrations"),
+        ({"model": "rays", "image_defocus": 1e-6}, "model 'rays' has no .* lenslet offset"),
         ({"axial_share": 2.0}, "axial_share is 2 but must be from 0 to 1"),
         ({"aberrations": {0: 0.1}}, "Noll's index is 0"),
         ({"wavelength": float("nan")}, "wavelength is nan"),

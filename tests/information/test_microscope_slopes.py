@@ -179,5 +179,5 @@ def test_microscopes_without_waves_are_refused():
 
 
 def test_pairs_with_other_lenslets_are_refused():
-    with pytest.raises(GeometryError, match="other numbers of lenslets"):
+    with pytest.raises(GeometryError, match="different numbers of lenslets"):
         slopes(scope(), [(scope(), scope(lenslets={"count": (11, 9)}))], DEPTHS, LIGHT)

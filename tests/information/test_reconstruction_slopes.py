@@ -116,5 +116,5 @@ def test_slopes_of_a_volume_are_of_the_error_of_all_depths_together():
 
 def test_other_instruments_and_sensors_are_refused():
     other = camera(sensor={"pixel_pitch": 10 * um, "read_noise": 7.0})
-    with pytest.raises(GeometryError, match="by optics and by the pixels' pitch"):
+    with pytest.raises(GeometryError, match="by the optics and the pixels' pitch"):
         reconstruction_slopes(camera(), [(camera(), other)], [DZ], SCENES)

@@ -104,5 +104,5 @@ def test_what_has_no_derivatives_is_refused(other):
 def test_points_that_are_not_told_are_refused():
     """By one pixel."""
     one = lg.load_camera("lfm-fourier").replace(sensor={"shape": (1, 1)})
-    with pytest.raises(GeometryError, match="do not tell depth at 0 m"):
+    with pytest.raises(GeometryError, match="do not determine depth at 0 m"):
         slopes(one, [], [0.0], LIGHT, places=1)

@@ -66,14 +66,14 @@ def test_light_of_each_raw_image_is_allowed_for(moved):
 
 
 def test_an_even_object_is_refused(moved):
-    with pytest.raises(lg.CalibrationError, match="do not tell how the object was moved"):
+    with pytest.raises(lg.CalibrationError, match="do not show how the object was moved"):
         lg.find_shifts(exposed(moved, np.full(moved.shape[1], 0.5)), CAMERA, TOLD)
 
 
 def test_a_shift_along_lines_is_warned_of_and_its_error_told(moved):
     x = moved.object_grid.x / SIZE
     picture = 0.5 + 0.3 * np.sin(np.pi / 2 * x + np.sin(x)) + np.zeros(moved.shape[1])
-    with pytest.warns(lg.SamplingWarning, match="along y is told to"):
+    with pytest.warns(lg.SamplingWarning, match="along y is known to"):
         found = lg.find_shifts(exposed(moved, picture), CAMERA, TOLD)
     assert (found.errors[1:, 0] > 0.4 * SIZE).all()
     assert (found.errors[1:, 1] < 0.02 * SIZE).all()
@@ -108,7 +108,7 @@ def test_fine_lines_that_pass_for_coarse_ones_are_warned_of(moved):
         (
             lambda raws: (raws, CAMERA.replace(lenslets={"count": (4, 4)}), None),
             lg.CalibrationError,
-            "16 lenslets, but shifts are told by 25",
+            "16 lenslets, but shifts need 25",
         ),
     ],
 )

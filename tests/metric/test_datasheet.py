@@ -206,7 +206,7 @@ def test_sets_of_exposures_differ_by_what_the_sheet_says():
     assert 0.9 < np.mean(within["patch_noise"]) < 0.99
     alone = steady.steady(sets[:1], "patch", "px")[1]
     assert alone.repeats is None
-    assert "nobody knows how well it repeats" in alone.how
+    assert "its repeatability is unknown" in alone.how
 
 
 def test_the_sheet_says_how_many_exposures_two_per_cent_take():

@@ -28,7 +28,7 @@ def knowing_b(error):
 
 def test_without_b_a_note_says_that_nothing_tells_the_spacing() -> None:
     (note,) = told()
-    assert note.startswith("nothing that was given tells whether the board's spacing is right")
+    assert note.startswith("nothing that was given shows whether the board's spacing is right")
 
 
 @pytest.mark.parametrize("off", [1.05, 0.95])

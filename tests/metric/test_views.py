@@ -101,7 +101,7 @@ def test_a_camera_1_0_comes_back_within_its_intervals(measured) -> None:
     b = scenes.VIEWS_CAMERA.lenslet_distance
     assert measured.errors[2] < 0.02 * b  # the prior does not know it at all
     assert "f and L change the pictures alike" in " ".join(measured.notes)
-    assert "this table of corners does not tell by how much" in measured.notes[-1]
+    assert "this table of corners does not say by how much" in measured.notes[-1]
 
 
 @pytest.mark.parametrize("distance", [0.3, 0.4075, 0.55])

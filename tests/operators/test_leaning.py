@@ -122,7 +122,7 @@ def test_what_cannot_lean_is_refused(camera):
         lg.simulate(made, Scene([lg.Slice(np.ones((3, 3)), lg.Grid.square(3, 5e-6))]), lg.Snapshots(2))
     with pytest.raises(GeometryError, match=r"leave array_tilt, array_bow and sensor_tilt out of \[built\]"):
         points_image(made, POINT, 1e-3)
-    with pytest.raises(GeometryError, match='model is "exact" but array or sensor lean'):
+    with pytest.raises(GeometryError, match='model is "exact" but array or sensor is tilted'):
         lg.simulate(made.replace(model="exact"), Scene([POINT]))
     with pytest.raises(GeometryError, match="the array is tilted by 110"):
         camera.replace(built={"array_tilt": ("110 mrad", "0 mrad")})

@@ -308,7 +308,7 @@ def test_ranges_and_stock_are_told_apart():
         (VARY, "largest luck", "no number 'luck'"),
         (VARY, "largest mtf@10/mm", "light-field-microscope"),
         ({}, "depth", "nothing to vary"),
-        ({"lenslets.layout": "hex"}, "depth", "none of the first 1 cameras can be"),
+        ({"lenslets.layout": "hex"}, "depth", "none of the first 1 cameras is possible"),
     ],
 )
 def test_nonsense_is_refused(vary, goal, said):

@@ -201,7 +201,7 @@ def test_a_part_of_the_picture_that_is_out_of_step_makes_no_slip(rng):
     found = drift(half, off(lattice))
     assert found.slip > 0.1, "which was warned of"
     assert found.slip < 3 * found.error
-    assert f"tell to ±{3 * found.error:.2f} only" in found.told()
+    assert f"known only to ±{3 * found.error:.2f}" in found.told()
     decode(half, off(lattice))  # warnings are errors
 
 

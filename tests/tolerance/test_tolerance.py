@@ -193,7 +193,7 @@ def test_cameras_that_cannot_be_are_left_out_and_told():
     found = study(focused(), wide, draws=60, measure=["corner shift y"])
     assert 2 <= len(found.failures) < 30
     assert len(found["corner shift y"].sample) == 60 - len(found.failures)
-    assert "cannot be and are left out" in next(found.notes())
+    assert "are impossible and left out" in next(found.notes())
 
 
 def test_camera_files_hold_tolerances_and_distances_as_built(camera):

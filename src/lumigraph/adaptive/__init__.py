@@ -1,18 +1,12 @@
 """Digital adaptive optics: an instrument's aberrations from the light field itself, together with the object.
 
-- `estimate`: `estimate`, from a raw image of beads or of any object
-- `start`: `start`, a first wavefront from the shifts of views; `Slopes`, its result
-- `sense`: `sense`, of a plenoptic camera before a point of light; `star`: its images by coefficients
+- `estimate`: aberrations from a raw image of beads (`of_beads`) or of any object (`of_volume`)
+- `start`, `sense`: a first wavefront from the shifts of views; the wavefront before a camera (`star`)
 - `wavefront`: `Wavefront`, the result; `wavefront_map`, Zernike terms over the pupil
-- `of_beads`: of beads, points or balls
-- `of_volume`: of any object; `scene`: a volume or picture before its instrument
-- `sight`: operators by coefficients; `voxels`: steps on volume and coefficients
-- `field`: nodes of the field at which coefficients stand
-- `search`: beads of a raw image through a wavefront; `beads`: of a volume; `changes`: what beads tell
-- `fit`: beads and coefficients by steps of Levenberg and Marquardt; `images`: of one bead, a point or a ball
-- `known`: how well coefficients are known that were found with beads
-- `clusters`: deviations that hold what the object does not explain; `misfit`: the warning of it
-- `worth`: which terms stay; `checked`: what is asked for
+- `scene`, `sight`, `voxels`: the object, its operators by coefficients, steps on volume and coefficients
+- `beads`, `search`, `changes`, `fit`, `images`: beads, their images and the steps of Levenberg and Marquardt
+- `field`, `known`, `clusters`: nodes of the field; uncertainty by noise and by unexplained light
+- `misfit`, `worth`, `checked`: the goodness of fit; selection of terms; checks of arguments
 """
 
 from lumigraph.adaptive.estimate import TERMS, estimate

@@ -1,4 +1,4 @@
-"""How pixels change by each bead's unknowns, only where it lights them, and what they tell together."""
+"""Changes of pixels by each bead's unknowns, where it lights them, and their Fisher information."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from lumigraph.operators.resampling import Part
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Changes:
-    """Of the pixels that one bead lights.
+    """Derivatives of the pixels that one bead lights.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class Changes:
     at: np.ndarray
 
     def weighted(self, weights: np.ndarray) -> "Changes":
-        """With weights of all pixels (ny, nx)."""
+        """The same derivatives, multiplied by weights of all pixels (ny, nx)."""
         return replace(self, by=self.by * weights[self.part].astype(self.by.dtype))
 
 
@@ -53,7 +53,7 @@ def told(
 
 
 def scored(beads: Sequence[Changes], lights: np.ndarray, mixed: np.ndarray, away: np.ndarray) -> np.ndarray:
-    """What pixels add (k, ny, nx) to slopes along mixed unknowns of all beads (unknowns, k); see `told`."""
+    """Scores (k, ny, nx): pixels' shares of the slopes along mixed unknowns (unknowns, k); see `told`."""
     found = np.zeros((mixed.shape[1], *away.shape), np.float32)
     for one, light, own in zip(beads, lights, np.split(mixed, len(beads)), strict=True):
         found[(slice(None), *one.part)] += np.tensordot(
@@ -75,7 +75,7 @@ def _common(one: slice, other: slice) -> slice:
 
 
 def _cut(changes: Changes, part: tuple[slice, ...]) -> np.ndarray:
-    """Flat (unknowns, pixels), of a part of its pixels."""
+    """Flat array (unknowns, pixels) of a part of its pixels."""
     own = (slice(p.start - a.start, p.stop - a.start) for p, a in zip(part, changes.part, strict=True))
     found = changes.by[(slice(None), *own)]
     return found.reshape(len(found), -1)

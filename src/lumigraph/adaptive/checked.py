@@ -1,4 +1,4 @@
-"""What is asked for: depths and terms, checked; and the instrument with what is found."""
+"""Checks of depths and terms that are to be estimated, and the instrument with the estimated aberrations."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeVar
@@ -12,7 +12,7 @@ from lumigraph.instruments.capabilities import Decoded, WithPupil
 
 
 class Kind(NamedTuple):
-    """What an object explains itself, in words, and why for each term."""
+    """Kind of object: the terms that it explains itself, in words, and the reason for each."""
 
     all_of_it: str
     reasons: dict[int, str]
@@ -82,8 +82,8 @@ def _require_known(instrument: LightFieldMicroscope | PlenopticCamera, kind: Kin
     if isinstance(instrument, LensletCamera) and isinstance(instrument, Decoded):
         if kind is not PICTURE:
             raise GeometryError(
-                "before a PlenopticCamera stands a 'picture', flat and at one known depth. For a point of "
-                "light see adaptive.sense."
+                "aberrations of a PlenopticCamera need a 'picture', flat and at one known depth. For a point "
+                "of light use adaptive.sense."
             )
     elif not isinstance(instrument, WithPupil) or instrument.configuration != "1.0":
         raise GeometryError(

@@ -1,15 +1,8 @@
-r"""How well coefficients are known where the object does not explain the raw image: by how scores scatter.
+r"""Uncertainty of coefficients where the object does not explain the raw image, by the scatter of scores.
 
-Pixels add scores s to the slope of the log-likelihood. Noise alone gives their sum the covariance S, Fisher's
-information. What the object leaves of the raw image is alike in neighbouring pixels, such as detail finer
-than its samples, or in the same place behind all lenslets, such as an error of the model. So sums over
-clusters of pixels, whose squares are added, say how far the whole sum scatters (White's sandwich, clustered
-both ways):
-
-.. math:: C = S^{-1} V S^{-1}, \quad V = V_{lenslets} + V_{places} - V_{both}
-
-What so few clusters of noise scatter by chance is left out; where there are few lenslets, their parts are
-clusters.
+White's sandwich C = S⁻¹ V S⁻¹ of Fisher's information S, clustered over lenslets and over places behind them:
+V = V_lenslets + V_places - V_both. What so few clusters of noise scatter by chance is left out; where there
+are few lenslets, their parts are clusters.
 
 H. White, Econometrica 50, 1 (1982); A. C. Cameron, J. B. Gelbach & D. L. Miller, J. Bus. Econ. Stat. 29, 238
 (2011).
@@ -32,7 +25,7 @@ SURE = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clusters:
-    """Of the pixels, each (ny, nx) of whole numbers from 0.
+    """Clusters of pixels, each an array (ny, nx) of whole numbers from 0.
 
     Parameters
     ----------
@@ -47,7 +40,7 @@ class Clusters:
 
     @classmethod
     def of(cls, calibration: Calibration, terms: int) -> "Clusters":
-        """Of a calibration's pixels, in more places than twice as many as there are terms.
+        """Clusters of a calibration's pixels, in more places than twice the number of terms.
 
         Parts of lenslets, each with `PLACES` along its sides, where there are no more than that.
         """
@@ -87,7 +80,7 @@ def widened(information: np.ndarray, known: np.ndarray, scatter: np.ndarray) -> 
 
 
 def _places(away: np.ndarray, count: int) -> np.ndarray:
-    """Which of `count` along each side a pixel stands in, by how far it is from its lenslet's middle."""
+    """Number (ny, nx) of the place, `count` along each side, by the offset from a lenslet's middle."""
     return _numbered(np.clip(np.floor((away + 0.5) * count), 0, count - 1))
 
 
@@ -110,6 +103,6 @@ def _free(sums: np.ndarray) -> float:
 
 
 def _filled(sums: np.ndarray) -> float:
-    """As many clusters, all alike, as scatter as much as these sums (terms, clusters) of noise do."""
+    """Effective number of clusters: equal ones that scatter as much as these sums (terms, clusters)."""
     powers = (sums**2).sum(0)
     return float(powers.sum() ** 2 / (powers**2).sum()) * (1 + 2 / len(sums))

@@ -22,10 +22,10 @@ TERMS = tuple(range(5, 16))
 
 REMEDY = {
     "beads": "Ask for more terms, more depths or regions of the field, or look for a volume.",
-    "volume": "Give depths that are closer together or reach farther, or ask for more terms.",
+    "volume": "Give depths that are closer together or reach farther, or more terms.",
     "picture": "Ask for more terms, give the picture's own depth, or crop what is not flat.",
 }
-"""Where an object does not explain the raw image."""
+"""Remedies, by kind of object, if it does not explain the raw image."""
 
 
 def estimate(
@@ -57,8 +57,8 @@ def estimate(
     what has adapted to a wrong wavefront resists a better one.
 
     Of a picture, something flat with texture at one known depth, in the same way, in as fine samples as
-    points' images change by: defocus is told then. For cameras 1.0 it is the only one. Pixels behind the two
-    outermost lenslets of a camera's array do not count.
+    points' images change by, with defocus among the terms. It is the only kind for cameras 1.0. Pixels
+    behind the two outermost lenslets of a camera's array do not count.
 
     Parameters
     ----------
@@ -70,8 +70,8 @@ def estimate(
     depths
         Planes in which beads are looked for, or of the volume [m], such as each 6 µm; the one of a picture.
     terms
-        Noll indices. Piston, tilt and, but for a picture, defocus cannot be told from the object's place: see
-        `Wavefront.untold`.
+        Noll indices. Piston, tilt and, but for a picture, defocus cannot be separated from the object's
+        place: see `Wavefront.untold`.
     regions
         Of the field along y and x, each with coefficients of its own at its middle; linear between.
         Neighbours are expected to differ by 0.3 waves rms, or less if the fit shows that they are more alike.
@@ -89,13 +89,13 @@ def estimate(
     Raises
     ------
     GeometryError
-        Another configuration, no terms, no depths, fewer than two of them or no beads where those are
-        looked for, several of a picture, another kind of object, beads or a volume before a camera, regions
-        of a volume or picture.
+        If the configuration or the kind of object is not supported; no terms or depths are given; beads
+        have fewer than two depths, or none is found; a picture has several depths; beads or a volume
+        stand before a camera; or a volume or picture has regions.
     CalibrationError
-        A raw image of another shape, or a dark one.
+        If the raw image has another shape, or is dark.
     SamplingError
-        It does not fit in memory.
+        If it does not fit in memory.
 
     Warns
     -----

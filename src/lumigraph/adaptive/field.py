@@ -1,4 +1,4 @@
-"""Nodes of the field at which coefficients stand, and what is expected of them before anything is seen."""
+"""Nodes of the field at which coefficients stand, and their prior."""
 
 import math
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ ALIKE = 0.3
 """Standard deviation that is expected, at first, of its difference between neighbouring nodes [waves rms]."""
 
 LEAST = 1e-3
-"""What it may fall to."""
+"""Least value of `alike` [waves rms]."""
 
 LEARNT = 30
 """Steps to the expectation that explains a fit best."""
@@ -42,7 +42,7 @@ class Nodes:
 
     @classmethod
     def of(cls, grid: Grid, regions: tuple[int, int], terms: int) -> "Nodes":
-        """Of a field's samples, in so many regions along y and x."""
+        """Nodes of a field's samples, in so many regions along y and x."""
         places = []
         for along, pitch, n in zip((grid.y, grid.x), grid.pitch, regions, strict=True):
             low, high = along[0] - pitch / 2, along[-1] + pitch / 2
@@ -61,7 +61,7 @@ class Nodes:
 
     @property
     def information(self) -> np.ndarray:
-        """Of the prior (nodes terms, nodes terms) [1/waves²]: values are small, neighbours alike."""
+        """Information of the prior (nodes terms, nodes terms) [1/waves²]: small values, alike neighbours."""
         even = np.eye(len(self)) / PRIOR**2 / len(self)
         return np.kron(even + self._rough / self.alike**2, np.eye(self.terms))
 
@@ -73,7 +73,7 @@ class Nodes:
         return np.diag(beside.sum(1)) - beside
 
     def learnt(self, coefficients: np.ndarray, covariance: np.ndarray) -> "Nodes":
-        """As alike as makes a fit's coefficients (nodes, terms) the most likely ones; at most `ALIKE`.
+        """Nodes whose likeness makes a fit's coefficients (nodes, terms) the likeliest; at most `ALIKE`.
 
         From the fit's covariance, by MacKay's fixed point. Neighbours that are as far apart as noise alone
         puts them are drawn together.

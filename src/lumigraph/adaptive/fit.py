@@ -78,7 +78,7 @@ class Fit:
     beads: tuple[Changes, ...] = ()
 
     def changed(self, **changes: Any) -> "Fit":
-        """With other points or coefficients, not judged yet."""
+        """The same fit with other points or coefficients, not judged yet."""
         return replace(self, objective=np.inf, light=None, **changes)
 
 
@@ -100,7 +100,7 @@ class Around:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """What pixels should read.
+    """Model of the expected pixels, and of their derivatives.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ class Model:
         return np.maximum(light, 0) + arrays.to_numpy(scale.background) + self.problem.floor
 
     def light(self, fit: Fit) -> np.ndarray:
-        """On the pixels (ny, nx)."""
+        """Light on the pixels (ny, nx)."""
         found = np.zeros(self.images.shape)
         for (part, pixels), light in zip(
             each(self._image, self._at(fit)), fit.points.intensities, strict=True
@@ -167,7 +167,7 @@ class Model:
         return found
 
     def _image(self, at: np.ndarray) -> tuple[Part, np.ndarray]:
-        """What part of the raw image a bead of light 1 lights, by place and coefficients, and its pixels."""
+        """Image of a bead of light 1 by place and coefficients: its part of the raw image, and its pixels."""
         return image_of(self.images, at, self.unit)
 
     def _at(self, fit: Fit) -> np.ndarray:
@@ -189,7 +189,7 @@ class Model:
         return float(x @ self.nodes.information @ x)
 
     def misfit(self, fit: Fit) -> Misfit:
-        """What a judged fit leaves of the raw image."""
+        """Misfit of a judged fit: what it leaves of the raw image."""
         assert fit.light is not None  # it was judged
         data = arrays.to_numpy(self.problem.data)
         return Misfit.of(self.weights, self.problem.scale.gain, data, self.expected(fit.light))
@@ -206,7 +206,7 @@ class Model:
         return Around(shared.T @ told_of[0] @ shared, shared.T @ told_of[1])
 
     def scores(self, fit: Fit, mixed: np.ndarray) -> np.ndarray:
-        """What pixels add (k, ny, nx) to slopes of the log-likelihood along mixed unknowns (all, k)."""
+        """Scores (k, ny, nx): pixels' shares of the likelihood's slopes along mixed unknowns (all, k)."""
         fit = self.known(fit)
         shared = _shared(self.nodes.at(fit.points), fit.coefficients.shape[1])
         return scored(fit.beads, fit.points.intensities, shared @ mixed, self._told(fit)[1])
@@ -218,7 +218,7 @@ class Model:
         return weights / shown, weights * (data / shown - 1)
 
     def _changes(self, at: np.ndarray, before: Sequence[Changes]) -> Changes:
-        """Of pixels, by the place and light of a bead of light 1 and by its coefficients (places, terms)."""
+        """Changes of pixels by a bead's place, light and coefficients (places, terms), for light 1."""
         longest = np.append(self.longest[:PLACES], np.full(len(at) - PLACES, self.longest[OWN]))
         for one in before:
             if (np.abs(at - one.at) < STALE * longest).all():
@@ -264,7 +264,7 @@ class Model:
     def _likelier(
         self, around: Around, fit: Fit, free: np.ndarray, damping: float
     ) -> tuple[Fit | None, float]:
-        """What a step leads to and the next one's damping; None where no step is likelier."""
+        """The fit after a likelier step and the next damping; None where no step is likelier."""
         for _ in range(TRIES):
             step = self._step(around, fit, free, damping)
             found = self.judged(self._moved(fit, step))
@@ -331,7 +331,7 @@ def _way(before: Fit, after: Fit) -> np.ndarray:
 
 
 def _shared(basis: np.ndarray, terms: int) -> np.ndarray:
-    """From all unknowns to those of each bead: its own, and the coefficients at its place."""
+    """Matrix (beads, own, all) from all unknowns to each bead's own and the coefficients at its place."""
     beads, nodes = basis.shape
     found = np.zeros((beads, OWN + terms, beads * OWN + nodes * terms))
     for p in range(beads):
@@ -341,5 +341,5 @@ def _shared(basis: np.ndarray, terms: int) -> np.ndarray:
 
 
 def stepped(progress: Progress, steps: int) -> None:
-    """Say that a fit has taken so many steps."""
+    """Report that a fit has taken so many steps."""
     progress(Stage(steps / (steps + USUAL), f"step {steps} of the fit"))

@@ -1,11 +1,7 @@
-r"""Images of one bead on the pixels, a point or a ball that shines evenly, and how they change.
+r"""Images of one bead on the pixels, a point or a ball that shines evenly, and their derivatives.
 
-27 points have a ball's moments up to the seventh order: its middle, and with coordinates of 0 or ±1/√p,
-±1/√q, ±1/√s radii 6 points on the axes, 12 between two of them and 8 between three, of weights p³/63, q³/630
-and s³/2520. Then <x⁶>, <x⁴ y²> and <x² y² z²> are a ball's 1/21, 1/105 and 1/315; and <x²> = 1/5,
-<x⁴> = 3/35 and <x² y²> = 1/35 where
-
-.. math:: 10 p^2 + 4 q^2 + s^2 = 63, \quad 10 p + 4 q + s = 27, \quad 2 q + s = 9
+A ball is replaced by 27 points that have its moments up to the seventh order: its middle, 6 points on the
+axes, 12 between two of them and 8 between three. Derivation: docs/theory/adaptive.md.
 """
 
 import math
@@ -23,7 +19,7 @@ OWN = PLACES + 1
 """Unknowns of a bead: y, x, dz and the logarithm of its light."""
 
 STEP = 0.05
-"""Of spread, in which a difference shows how images change by it."""
+"""Step of the spread, for differences of images."""
 
 Q = (18 - math.sqrt(30)) / 7
 P, S = (9 - Q) / 5, 9 - 2 * Q
@@ -37,7 +33,7 @@ BALL *= np.array([1, P, Q, S])[KINDS, None] ** -0.5
 
 WEIGHTS = np.array([0, P**3 / 63, Q**3 / 630, S**3 / 2520])[KINDS]
 WEIGHTS[KINDS == 0] = 1 - WEIGHTS.sum()
-"""Their parts of its light."""
+"""Parts of a ball's light at its points."""
 
 SMALL = np.concatenate([np.eye(3), -np.eye(3)]) * math.sqrt(3 / 5)
 """Points, alike, that stand for a ball whose spread is no more than `STEP`: they have its moments up to the
@@ -52,7 +48,7 @@ class Images(Protocol):
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Of a raw image."""
+        """Shape (ny, nx) of a raw image."""
         ...
 
     def fixed(self, coefficients: np.ndarray) -> "Images":
@@ -78,7 +74,7 @@ class Images(Protocol):
 
 
 def diameter(spread: float, unit: float) -> float:
-    """Of a ball whose light has a variance of so many squared units along each axis."""
+    """Diameter of a ball [m] whose light has a variance of so many squared units along each axis."""
     return 2 * unit * math.sqrt(5 * spread)
 
 
@@ -91,7 +87,7 @@ def image_of(images: Images, at: np.ndarray, unit: float) -> Seen:
 
 
 def changes_of(images: Images, at: np.ndarray, unit: float) -> Seen:
-    """How it changes (unknowns, rows, columns), by the bead's place and light, then by coefficients."""
+    """Derivatives (unknowns, rows, columns) of a bead's image by place and light, then by coefficients."""
     n = len(at) - PLACES - bool(unit)
 
     def own(lit: Lit) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""How well coefficients are known that were found with beads: by noise, and by how pixels' scores scatter."""
+"""Uncertainty of coefficients that were found with beads: by noise, and by the scatter of pixels' scores."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from lumigraph.core.calibration import Calibration
 
 
 def covariance_of(model: Model, fit: Fit) -> np.ndarray:
-    """Of all unknowns, by noise; larger where the beads do not explain the raw image."""
+    """Covariance of all unknowns, by noise; larger where the beads do not explain the raw image."""
     whole = model.around(fit).information / max(model.misfit(fit).pearson, 1.0)
     n = fit.coefficients.size
     whole[-n:, -n:] += model.nodes.information
@@ -16,12 +16,12 @@ def covariance_of(model: Model, fit: Fit) -> np.ndarray:
 
 
 def covariance_of_coefficients(model: Model, fit: Fit) -> np.ndarray:
-    """The part (nodes terms, nodes terms) of it [waves² rms]."""
+    """Covariance (nodes terms, nodes terms) of the coefficients [waves² rms]."""
     return covariance_of(model, fit)[-fit.coefficients.size :, -fit.coefficients.size :]
 
 
 def scattered(model: Model, fit: Fit, calibration: Calibration) -> np.ndarray:
-    """The same by how pixels' scores scatter, too, behind lenslets of a calibration; see `clusters`.
+    """Covariance of the coefficients by the scatter of pixels' scores, too, behind lenslets; see `clusters`.
 
     Scores of the coefficients are what pixels add to their slopes while beads move along.
     """

@@ -1,4 +1,4 @@
-"""How far an object explains a raw image, over what noise leaves; and a warning where it does not."""
+"""Misfit of an object to its raw image, in units of noise, and a warning where it is large."""
 
 import warnings
 from typing import NamedTuple
@@ -11,11 +11,11 @@ SURE = 5.0
 """Standard deviations of noise above which a misfit is none of noise."""
 
 SMALL = 0.05
-"""Variances of noise by which what is left may exceed 1: models to 1e-2 leave as much in 600 electrons."""
+"""Variances of noise by which residuals may exceed 1: models to 1e-2 leave as much in 600 electrons."""
 
 
 class Misfit(NamedTuple):
-    """Mean over the pixels of what is left of them, in variances of noise.
+    """Mean square of the pixels' residuals, in variances of noise.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Misfit(NamedTuple):
 
     @classmethod
     def of(cls, weights: np.ndarray, gain: float, data: np.ndarray, shown: np.ndarray) -> "Misfit":
-        """Of data and a model (ny, nx), whose units count for weights (ny, nx) of electrons.
+        """Misfit of data and a model (ny, nx), whose units count for weights (ny, nx) of electrons.
 
         (r - m)²/m of Poisson's noise has the variance 2 + 1/m.
         """
@@ -41,11 +41,11 @@ class Misfit(NamedTuple):
 
     @property
     def explained(self) -> bool:
-        """Whether noise, and what models get wrong of bright images, may leave as much."""
+        """True if noise, and errors of models of bright images, may leave as much."""
         return self.pearson <= 1 + max(SURE * self.deviation, SMALL)
 
     def warn(self, what: str, remedy: str) -> None:
-        """Warn where it is not explained; `what` leaves so much, and what helps."""
+        """Warn if the misfit is too large; `what` leaves it, and `remedy` says what helps."""
         if not self.explained:
             warnings.warn(
                 f"{what} {self.pearson:.3g} times the variance of noise in the raw image, where noise leaves "

@@ -28,20 +28,20 @@ from lumigraph.operators.microscope_pupil import PLACES
 from lumigraph.scene import Points
 
 ACCURACY = 3e-2
-"""Of points' images: their errors are not alike from bead to bead, and below noise but in bright images."""
+"""Accuracy of points' images: their errors differ from bead to bead, below noise but in bright images."""
 
 FINE = 1e-2
 """Accuracy of the last steps where beads leave more than noise: with 2·10⁵ photons in each of 6, images
 to 3e-2 left 1.084 times its variance, those to 1e-2 left 1.002, in 17 CPU s for 15."""
 
 COARSE = 0.3
-"""Accuracy asked of their derivatives, which then are off by 4 to 11 %, and single ones by up to 36 %."""
+"""Accuracy of their derivatives, which then are off by 4 to 11 %, and single ones by up to 36 %."""
 
 ROUNDS = 3
-"""How often beads are looked for at most: in the raw image, then in what those before leave."""
+"""Searches for beads at most: in the raw image, then in what those before leave."""
 
 STEPS = {"places": 4, "all": 40}
-"""Of the fit, at most."""
+"""Steps of the fit, at most."""
 
 SPREAD = 3.0
 """Pixels that beads light through aberrations of 1 wave rms, over those without: 2.7 before a 20x/0.5."""
@@ -92,7 +92,7 @@ def _worth(known: "_Known", model: Model, fit: Fit) -> tuple[Model, Fit, np.ndar
 def _wavefront(
     known: "_Known", model: Model, fit: Fit, covariance: np.ndarray, before: tuple[float, int]
 ) -> Wavefront:
-    """By the covariance of terms and spread, the deviance of beads alone, and how often they were sought."""
+    """Wavefront by the covariance of terms and spread, the deviance of beads alone, and their searches."""
     terms, misfit = known.terms, model.misfit(fit)
     own = np.tile(np.arange(len(terms) + 1) < len(terms), len(model.nodes))
     own_covariance = covariance[np.ix_(own, own)]
@@ -115,7 +115,7 @@ def _wavefront(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Known:
-    """What is given, put together."""
+    """Arguments of an estimate, put together."""
 
     microscope: LightFieldMicroscope
     search: Search
@@ -137,7 +137,7 @@ class _Known:
         microscope = cast("LightFieldMicroscope", instrument)  # cameras have no beads
         if len(planes) < 2:
             raise GeometryError(
-                f"depths are {list(planes)} but beads need at least two planes to stand between."
+                f"depths are {list(planes)} but beads need at least two planes, to lie between them."
             )
         if exposure is None:
             exposure = Exposure.of(raw) if isinstance(raw, RawImage) else Exposure()
@@ -145,7 +145,7 @@ class _Known:
         return cls(microscope, search, search.problem(np.zeros(len(found))), found, untold, pixels)
 
     def model(self, regions: tuple[int, int], progress: Progress) -> Model:
-        """Of the pixels."""
+        """Model of the pixels."""
         images = replace(self.search.sight.images, accuracy=ACCURACY)
         nodes = Nodes.of(self.search.sight.picture, regions, len(self.terms))
         coarse = replace(images, accuracy=COARSE)
@@ -153,12 +153,12 @@ class _Known:
 
     @property
     def unit(self) -> float:
-        """Of how far beads spread [m]: what the objective resolves, λ/(2 NA)."""
+        """Unit of the spread of beads [m]: the objective's resolution, λ/(2 NA)."""
         return min(one.wavelength / (2 * one.aperture) for one in self.search.sight.images.objectives)
 
     @property
     def calibration(self) -> Calibration:
-        """Of the raw image."""
+        """Calibration of the raw image."""
         return self.microscope.calibration if self.pixels is None else self.pixels
 
     def starts(self) -> list[np.ndarray]:
@@ -258,7 +258,7 @@ def _without_faint(model: Model, fit: Fit) -> Fit:
 
 
 def _require_memory(model: Model, fit: Fit) -> None:
-    """Of the changes of the pixels that each bead lights, before and after a step."""
+    """Refuse derivatives of the pixels that beads light if they do not fit in memory twice."""
     images, count = model.coarse or model.images, len(fit.points.intensities)
     farthest = float(np.abs(fit.points.positions[:, 2]).max())
     unknowns = OWN + fit.coefficients.shape[1]

@@ -70,7 +70,7 @@ def of_volume(
 
 
 def _improved(voxels: Voxels, told: Told, free: np.ndarray, iterations: Sequence[int]) -> tuple[Told, Around]:
-    """Step by step with volumes that are followed farther and farther, at last by the slope."""
+    """Volume and coefficients after steps with more and more iterations, at last by the slope."""
     found = voxels.improved(told, free)
     for n in iterations[1:]:
         found = voxels.improved(voxels.begun(found[0].coefficients, n, found[0].steps), free)
@@ -78,7 +78,7 @@ def _improved(voxels: Voxels, told: Told, free: np.ndarray, iterations: Sequence
 
 
 def _is_likelier(voxels: Voxels, told: Told, plain: Told) -> bool:
-    """Whether coefficients are worth it, all together, by Schwarz's criterion.
+    """True if all coefficients together are worth it by Schwarz's criterion.
 
     Volumes on a grid of samples do not explain raw images to their noise: what they leave, in variances of
     noise, raises the bar.
@@ -89,7 +89,7 @@ def _is_likelier(voxels: Voxels, told: Told, plain: Told) -> bool:
 
 
 def _covariance(voxels: Voxels, told: Told, around: Around, clusters: Clusters, left: float) -> np.ndarray:
-    """Of the coefficients: by noise, what the object leaves of the raw image, what models do, what pulls."""
+    """Covariance of the coefficients: by noise, unexplained light, model errors and the object's pull."""
     one, pearson = np.eye(len(around.information)), max(voxels.misfit(told).pearson, 1.0)
     known = around.information / pearson + one / PRIOR**2
     scatter = clusters.scatter(around.scores, pearson * around.information)

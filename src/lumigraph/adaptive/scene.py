@@ -1,4 +1,4 @@
-"""What stands before an instrument: a volume, or a picture at one depth, and what shows it."""
+"""Object before an instrument, a volume or a picture at one depth, and its operators."""
 
 import math
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ from lumigraph.operators.microscope_pupil import PupilImages
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How one kind of object is looked for.
+    """Settings of the search for one kind of object.
 
     Parameters
     ----------
@@ -106,13 +106,13 @@ class Scene:
     pixels: Calibration | None
 
     def method(self, sight: Sight) -> RichardsonLucy:
-        """By which it is found."""
+        """Method by which the object is found."""
         resolved = self.settings.resolved
         low_pass = None if resolved is None else LowPass((sight.samples * resolved,))
         return RichardsonLucy(accelerated=True, filter=low_pass)
 
     def sight(self, terms: tuple[int, ...]) -> Sight:
-        """Its operators by the terms' coefficients."""
+        """Operators of the object by the terms' coefficients."""
         images, planes = self._images(terms)
         samples = self.settings.samples or finest(images)
         narrow = Sight(images, planes, samples, -images.layout.frame)
@@ -131,11 +131,11 @@ class Scene:
         return images, self.depths
 
     def clusters(self, terms: int) -> Clusters:
-        """Of the pixels, for so many terms."""
+        """Clusters of the pixels, for so many terms."""
         return Clusters.of(self.instrument.calibration if self.pixels is None else self.pixels, terms)
 
     def counted(self, exposure: Exposure) -> Exposure:
-        """Without the pixels that see where a camera's array ends."""
+        """Exposure without the pixels that see the edge of a camera's array."""
         if not isinstance(self.instrument, LensletCamera):
             return exposure
         inner = inner_pixels(self.instrument, self.pixels)

@@ -22,10 +22,10 @@ COARSE = 0.1
 """Accuracy of the images by which beads are looked for."""
 
 SAMPLES = 3
-"""Of the volume in which beads are looked for, along a lenslet."""
+"""Samples along a lenslet of the volume in which beads are searched."""
 
 ITERATIONS = 30
-"""Of Richardson-Lucy, by which beads are looked for."""
+"""Iterations of Richardson-Lucy in a search for beads."""
 
 APART = (1.6, 1.25)
 """Half axes of the spheroids in which light is one bead's, in lenslets: at first, at whatever depth, for
@@ -35,12 +35,12 @@ FAINT = (0.15, 0.05)
 """Light of a bead that counts, over the brightest's at first, and over the median of those found later."""
 
 BEYOND = 6e-6
-"""How far beyond the outermost depths beads may stand [m]."""
+"""Distance beyond the outermost depths within which beads may stand [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Search:
-    """What beads are looked for with.
+    """Search for beads in a raw image.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Search:
         given: tuple[RawImage | np.ndarray, Exposure, Calibration | None],
         accuracy: float,
     ) -> "Search":
-        """Of (raw image, exposure, pixels), on planes [m], with images to an accuracy."""
+        """Search in (raw image, exposure, pixels), on planes [m], with images to an accuracy."""
         raw, exposure, pixels = given
         farthest, part = float(np.abs(planes).max()), microscope.objective
         images = microscope.pupil_images(terms, farthest=farthest, accuracy=accuracy, pixels=pixels)
@@ -80,7 +80,7 @@ class Search:
         return cls(sight, raw, exposure, slope, microscope.lenslet_size)
 
     def problem(self, coefficients: np.ndarray) -> Problem:
-        """Of the raw image, through aberrations (terms,) [waves rms]."""
+        """Deconvolution problem of the raw image, through aberrations (terms,) [waves rms]."""
         operator = self.sight.operator(coefficients)
         data = values(self.raw, operator, self.exposure)
         return Problem.of(self.raw, self.exposure, Scale.of(operator, self.exposure, data, BARELY))
@@ -93,7 +93,7 @@ class Search:
         return np.array([min(a) for a in axes]) - beside, np.array([max(a) for a in axes]) + beside
 
     def beads(self, problem: Problem, shown: np.ndarray | None = None) -> Points:
-        """Of a `problem`; of what is brighter than `shown` (ny, nx) where that is given."""
+        """Beads of a `problem`; only of what is brighter than `shown` (ny, nx) where that is given."""
         if shown is not None:
             problem = replace(problem, scale=replace(problem.scale, background=shown))
         method, state = RichardsonLucy(), State.at(problem, problem.flat())

@@ -27,7 +27,7 @@ MODES = tuple(range(4, 22))
 """Noll indices up to the fifth order that a point's place does not explain."""
 
 STEPS = 30
-"""Of the fit, at most."""
+"""Steps of the fit, at most."""
 
 PLACED = {
     1: PISTON,
@@ -59,12 +59,12 @@ def sense(
     camera
         With a main lens and lenslets. Aberrations of its description are taken as known.
     terms
-        Noll indices. Piston and tilt are left out: see `Wavefront.untold`. Defocus is told, for the point's
-        depth is taken as known.
+        Noll indices. Piston and tilt are left out: see `Wavefront.untold`. Defocus is estimated: the
+        point's depth is taken as known.
     place
         Of the point (y, x, dz), from the axis and the focused plane [m]; y and x within half a lenslet's
-        cell. A sharp image in the middle of a lenslet tells little; on the corner of four lenslets it makes
-        the camera a pyramid sensor.
+        cell. A sharp image in the middle of a lenslet carries little information; on the corner of four it
+        makes the camera a pyramid sensor.
     exposure
         Background, gain, dead pixels; None for what a `RawImage` records. Without a gain a grey value counts
         as one electron.
@@ -134,7 +134,7 @@ def _model(
     exposure: Exposure | None,
     progress: Progress,
 ) -> tuple[Model, Fit]:
-    """What the pixels should read, and a point without aberrations to begin with."""
+    """Model of the expected pixels, and a point without aberrations to begin with."""
     at = np.array([checks.finite("a place", float(one)) for one in place])
     star.camera.defocused(float(at[2]))
     if exposure is None:

@@ -1,4 +1,4 @@
-"""How a microscope sees a volume, for any Zernike terms of its pupil: its operator, and those of changes.
+"""Operators of a microscope for any Zernike terms of its pupil, and their derivatives.
 
 Moving a point by a lenslet moves its image by a lenslet, so that the images of the points of one cell, and
 their derivatives, make whole operators.
@@ -21,7 +21,7 @@ from lumigraph.operators.microscope_pupil import PLACES, Lit, PupilImages
 from lumigraph.scene import Points
 
 SHARE = 0.5
-"""Of the accuracy, rms, that cells which are left out may take."""
+"""Share of the accuracy, rms, that omitted cells may take."""
 
 COARSE = 0.1
 """Accuracy of derivatives: they show the way, and the images themselves where it ends."""
@@ -50,19 +50,19 @@ class Sight:
 
     @classmethod
     def of(cls, images: PupilImages, planes: Sequence[float], samples: int) -> "Sight":
-        """With a volume that reaches as far as light comes from without aberrations."""
+        """Operators of a volume that reaches as far as light comes from without aberrations."""
         first = cls(images, tuple(planes), samples, -images.layout.frame)
         _, (rows, _) = beyond(first.operator(np.zeros(len(images.terms))))
         return replace(first, margin=first.margin + (rows.start or 0) // samples)
 
     @property
     def grid(self) -> Grid:
-        """Of the volume's planes, with what is beyond the picture."""
+        """Grid of the volume's planes, with what is beyond the picture."""
         return self._grid(self.margin)
 
     @property
     def picture(self) -> Grid:
-        """Of the volume's planes before the lenslets of the picture."""
+        """Grid of the volume's planes before the lenslets of the picture."""
         return self._grid(-self.images.layout.frame)
 
     def _grid(self, margin: int) -> Grid:
@@ -88,7 +88,7 @@ class Sight:
         return self._of(kernels)
 
     def changes(self, coefficients: np.ndarray) -> list[MicroscopeOperator]:
-        """Of the operator by each coefficient [1/waves rms]; their points' images reach below 0."""
+        """Derivatives of the operator by each coefficient [1/waves rms]; they reach below 0."""
         terms = len(self.images.terms)
         directions = np.eye(terms, terms + PLACES)
         coarse = replace(self.images, accuracy=max(COARSE, self.images.accuracy))
@@ -138,7 +138,7 @@ class Sight:
         return (cells * self.brighter).astype(np.float32)
 
     def _kernel(self, blocks: np.ndarray) -> SliceKernel:
-        """Of images (points, T², N²), without the cells that hold little."""
+        """Kernel of images (points, T², N²), without the cells that hold little."""
         T = math.isqrt(blocks.shape[1])
         power = np.square(blocks, dtype=np.float64).sum((0, 2))
         order = np.argsort(power)

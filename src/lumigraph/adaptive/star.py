@@ -1,4 +1,4 @@
-"""How a camera sees a point of light, for any Zernike terms of its main lens: images and derivatives."""
+"""Images of a point of light before a camera, for any Zernike terms of its main lens, and derivatives."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from lumigraph.operators.resampling import Part
 from lumigraph.scene import Points
 
 ACCURACY = 1e-2
-"""Of points' images."""
+"""Accuracy of points' images."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Star:
-    """Images of a point at a depth that is known, as `PupilImages` has them of microscopes.
+    """Images of a point at a known depth before a camera, as `PupilImages` has them of microscopes.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Star:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Of a raw image."""
+        """Shape (ny, nx) of a raw image."""
         return self.camera.sensor.shape
 
     def period(self, dz: float) -> float:
@@ -42,7 +42,7 @@ class Star:
         return self.camera.wavelength * (self.camera.object_distance + dz) / self.camera.pupil_diameter
 
     def cell(self, dz: float) -> float:
-        """Of a lenslet in the object [m]."""
+        """Size of a lenslet in the object [m]."""
         camera = self.camera
         return camera.lenslets.pitch * (camera.object_distance + dz) / camera.separation
 
@@ -103,7 +103,7 @@ class Alone(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of the raw image, and one number."""
+        """Shapes of the raw image, and of one number."""
         return self.image.shape, (1,)
 
     def _forward(self, intensity: np.ndarray) -> np.ndarray:
@@ -114,5 +114,5 @@ class Alone(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of the image."""
+        """Size of the image [bytes]."""
         return float(self.image.nbytes)

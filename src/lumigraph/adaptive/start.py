@@ -26,13 +26,13 @@ from lumigraph.instruments.capabilities import Decoded, WithPupil
 from lumigraph.rendering import decode
 
 EDGE = 0.9
-"""Of the pupil's radius, within which views count: beyond it they are dark, or half of them is."""
+"""Part of the pupil's radius within which views count: beyond it they are dark, or half of them is."""
 
 SMOOTH = (2.0, 1.2, 0.7, 0.5)
 """Standard deviations by which pictures are smoothed, in turn: large shifts come first [lenslets]."""
 
 TURNS = 8
-"""Of comparing and moving, for each of them."""
+"""Rounds of comparing and moving, for each of them."""
 
 DEFOCUS = 4
 """Noll's index."""
@@ -41,7 +41,7 @@ BASE = (2, 3, DEFOCUS)
 """Tilts and defocus, which are the scene's place and depth: fitted and dropped."""
 
 STEP = 1e-4
-"""Of central differences, in pupil radii."""
+"""Step of central differences, in pupil radii."""
 
 TILE, TILES = 2, 8
 """Least lenslets along a side of the parts whose scatter gives the deviations, for neighbours share light and
@@ -93,7 +93,7 @@ class Slopes:
 
     @property
     def rms(self) -> float:
-        """Of the wavefront [waves]."""
+        """Rms of the wavefront [waves]."""
         return float(np.linalg.norm(list(self.coefficients.values())))
 
 
@@ -206,7 +206,7 @@ def _seen(instrument: LightFieldMicroscope | PlenopticCamera) -> tuple[float, fl
         return instrument.lenslets.pitch / instrument.magnification, instrument.pupil_diameter / 2 / distance
     if not isinstance(instrument, WithPupil) or instrument.configuration != "1.0":
         raise GeometryError(
-            "slopes are those of a PlenopticCamera or a LightFieldMicroscope of configuration '1.0'."
+            "only a PlenopticCamera or a LightFieldMicroscope of configuration '1.0' has slopes of views."
         )
     return instrument.lenslet_size, instrument.objective.numerical_aperture
 
@@ -243,7 +243,7 @@ def _views(
 def _spilled(
     places: np.ndarray, instrument: LightFieldMicroscope | PlenopticCamera, aperture: float
 ) -> np.ndarray:
-    """How far light from other lenslets moves the pictures (k, 2) that are seen from places in the pupil.
+    """Displacement (k, 2) of pictures, seen from places in the pupil, by light from neighbouring lenslets.
 
     In lenslets, behind square ones of a camera. Each lenslet's image of the pupil is blurred by its spot,
     sinc² along y and x; what falls into a neighbour's micro-image is a picture that is moved by a lenslet.
@@ -281,7 +281,7 @@ def _polynomials(places: np.ndarray, terms: Sequence[int]) -> np.ndarray:
 
 
 def _compared(pictures: np.ndarray, shifts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What pictures (k, t, s), moved back, differ by from their mean; its slopes (2, t, s), and their square.
+    """Differences of pictures (k, t, s), moved back, from their mean; its slopes (2, t, s), and their square.
 
     Inside the border, with a ridge that bounds shifts where there is little texture.
     """

@@ -39,7 +39,7 @@ TRIES = 4
 """Steps, each shorter than the one before, of which one must be likelier."""
 
 STEPS = 25
-"""At most."""
+"""Steps, at most."""
 
 SETTLED, SETTLING = 0.1, 6
 """Chi square of a step, all coefficients together, that need not be taken any more; and steps at most."""
@@ -80,7 +80,7 @@ class Told:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Around:
-    """What coefficients change around a volume and coefficients.
+    """Derivatives of the log-likelihood by coefficients, around a volume and a wavefront.
 
     Parameters
     ----------
@@ -103,13 +103,13 @@ class Around:
     pull: np.ndarray
 
     def less(self, part: float, pull: np.ndarray) -> "Around":
-        """With a part of the information, and a slope without what pulls at it."""
+        """The same with a part of the information, and a slope without what pulls at it."""
         return replace(self, information=part * self.information, slope=self.slope - pull, pull=pull)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Voxels:
-    """What a raw image is explained by.
+    """Model of a raw image: a volume before its instrument's wavefront.
 
     Parameters
     ----------
@@ -146,12 +146,12 @@ class Voxels:
         return float(self._weights(told.problem).sum()) / told.problem.scale.gain
 
     def misfit(self, told: Told) -> Misfit:
-        """What is left of the raw image."""
+        """Misfit of the raw image."""
         shown, data = arrays.to_numpy(told.state.model), arrays.to_numpy(told.problem.data)
         return Misfit.of(self._weights(told.problem), told.problem.scale.gain, data, shown)
 
     def improved(self, told: Told, free: np.ndarray, steps: int = STEPS) -> tuple[Told, Around]:
-        """After at most some steps, with those coefficients free that are marked; and what is around them."""
+        """Volume and coefficients after at most some steps of the marked terms, and what is around them."""
         damping, around = 1e-2, self.around(told)
         for _ in range(steps):
             found = None
@@ -171,7 +171,7 @@ class Voxels:
         return told, around
 
     def settled(self, told: Told, around: Around, free: np.ndarray) -> tuple[Told, Around]:
-        """After at most some steps to where the slope vanishes, likelier or not; and what is around them.
+        """The same after at most some steps to where the slope vanishes, and what is around them.
 
         An object takes up noise, and the more of it the more a wavefront spreads the light: where the
         deviance is least, coefficients are off by that. The slope leaves out most of what the object takes
@@ -206,7 +206,7 @@ class Voxels:
         return (slopes[0] + slopes[1]) / 2
 
     def _part(self, told: Told, around: Around, free: np.ndarray) -> float:
-        """Of the change of the slope that the information promises, what a step brings; at most 1."""
+        """Part of the slope's change that the information promises and a step brings; at most 1."""
         whole, _ = self._free(told, around, free)
         step = np.zeros(len(free))
         step[free] = np.linalg.inv(np.linalg.cholesky(whole)).T.sum(1) * PROBE / math.sqrt(len(whole))
@@ -216,7 +216,7 @@ class Voxels:
         )
 
     def _farther(self, told: Told, found: Told) -> Told:
-        """Twice as far, as long as it is likelier: the volume that resisted goes along."""
+        """Volume and coefficients after steps each twice as long, as long as they are likelier."""
         while True:
             step = 2 * (found.coefficients - told.coefficients)
             if np.linalg.norm(step) > LONGEST:
@@ -228,7 +228,7 @@ class Voxels:
 
     @single_products()
     def around(self, told: Told, by: Sequence[MicroscopeOperator] | None = None) -> Around:
-        """How coefficients change the image, and what of that the volume explains."""
+        """Derivatives of the image by coefficients, without what the volume explains of them."""
         scale, volume = told.problem.scale, np.asarray(told.state.estimate, np.float32)
         response = 1.0 if scale.response is None else arrays.to_numpy(scale.response)
         shown, data = arrays.to_numpy(told.state.model), arrays.to_numpy(told.problem.data)
@@ -280,7 +280,7 @@ class Voxels:
         return step / max(1.0, float(np.linalg.norm(step)) / LONGEST)
 
     def _steep(self, told: Told, around: Around, free: np.ndarray) -> float:
-        """Chi square of the step that the slope asks for."""
+        """Chi square of the step that the slope implies."""
         whole, slope = self._free(told, around, free)
         return float(slope @ solved(whole, slope))
 

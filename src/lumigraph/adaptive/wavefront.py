@@ -1,4 +1,4 @@
-"""`Wavefront`: what a light field tells of its instrument's aberrations."""
+"""`Wavefront`: an instrument's aberrations, estimated from a light field."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -83,7 +83,7 @@ class Wavefront:
 
     @property
     def rms(self) -> float:
-        """Of the mean wavefront [waves]."""
+        """Rms of the mean wavefront [waves]."""
         return float(np.linalg.norm(self.values.mean((0, 1))))
 
     def phase(self, samples: int = 129) -> np.ndarray:

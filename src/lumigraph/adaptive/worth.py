@@ -1,4 +1,4 @@
-"""Which terms a raw image is worth: Schwarz's criterion."""
+"""Selection of the terms that a raw image justifies, by Schwarz's criterion."""
 
 import math
 
@@ -8,11 +8,11 @@ UNKNOWN = "the light field holds too little information"
 
 
 def worth(covariance: np.ndarray, coefficients: np.ndarray, pixels: float, prior: np.ndarray) -> np.ndarray:
-    """Which terms (terms,) of coefficients (nodes, terms) a raw image of so many pixels is worth.
+    """Mask (terms,) of the coefficients (nodes, terms) that a raw image of so many pixels justifies.
 
-    Those that gain more log-likelihood, without the others, than the part of the prior's width that the
-    data leave them costs (Laplace's approximation of the evidence), and than ½ ln N (Schwarz's criterion).
-    Covariance and the prior's information are (nodes terms, nodes terms).
+    A term stays if it gains more log-likelihood than ½ ln N (Schwarz's criterion), and than the narrowing of
+    the prior's width by the data costs (Laplace's approximation of the evidence), once the others are left
+    out. Covariance and the prior's information are (nodes terms, nodes terms).
     """
     nodes, count = coefficients.shape
     free = np.ones(count, bool)

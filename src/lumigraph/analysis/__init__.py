@@ -1,15 +1,12 @@
 """Measures of an image: how good, how sharp, how much contrast.
 
 - `signal`: `snr` and `rms_error` of an image against a reference
-- `profiles`: `first_zero`, `full_width` and `contrast` of a profile
-- `transfer`: `mtf` of a point image, and its `cutoff`
-- `slanted_edge`: the MTF across an edge in a picture, as ISO 12233 measures it
-- `chart`: corners, edges and distortion of a chessboard on a picture, by `saddles` of the brightness
-- `crossings`: where the edges of saddles cross, which samples do not pull
-- `pupil_edge`: how many directions lenslets tell apart, from the edges of micro-images
+- `profiles`, `psf`: `first_zero`, `full_width`, `contrast`; `centroid`, `encircled_energy` of a point
+- `transfer`, `slanted_edge`: `mtf` of a point image, its `cutoff`; the MTF across an edge, as in ISO 12233
+- `chart` (`saddles`, `crossings`): corners, edges and distortion of a chessboard on a picture
+- `pupil_edge`: directional resolution of lenslets, from the edges of micro-images
 - `photon_transfer`: gain, noise, dark signal and full well of a sensor, by EMVA 1288
 - `beams`: `beam_width`, `divergence`, `beam_quality` and degrees of coherence of light on a plane
-- `psf`: `centroid` and `encircled_energy` of a point image
 """
 
 from lumigraph.analysis import psf

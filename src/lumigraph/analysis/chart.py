@@ -26,7 +26,7 @@ _ASKEW = 0.5  # sine of the least angle between the sides of a square that is se
 _PART = 0.8  # of a square's edge, far enough from its corners
 _LONGEST = 48  # samples of an edge that are taken
 LEAST_BENT = 12
-"""Corners from which a distortion is told."""
+"""Corners from which a distortion is measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +76,7 @@ class Chart:
         return self._squares()[2] / self.spacing
 
     def _squares(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Vectors (2, 2) of a square's sides, covariance (2, 2) along an axis, and rms of what is left."""
+        """Vectors (2, 2) of a square's sides, covariance (2, 2) along an axis, and rms residual."""
         design = np.column_stack([self.indices - self.indices.mean(0), np.ones(len(self))])
         fit = np.linalg.lstsq(design, self.corners, rcond=None)[0]
         left = ((self.corners - design @ fit) ** 2).sum()

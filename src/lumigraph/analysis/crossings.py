@@ -5,9 +5,9 @@ a sample where edges are as sharp as pixels. So two straight edges that cross ar
 
 .. math:: I = c + a\, E(d_1)\, E(d_2)
 
-with d the way from an edge and E from -1 to 1, as pixels 1 wide and a normal blur make it of a step. Where
-an edge passes from one sample to the next in less than a sample, no samples tell where: sharp edges that run
-along rows behind round lenslets, or pixels with gaps, remain 0.04 off. Edges turned by 10° do not.
+with d the distance from an edge and E from -1 to 1, a step as pixels 1 wide and a normal blur make it. Edges
+along rows that are sharper than a sample, behind round lenslets or pixels with gaps, remain 0.04 off; edges
+turned by 10° do not.
 """
 
 import numpy as np
@@ -20,11 +20,11 @@ _SHARP = 0.3  # samples: blur to begin with
 _KNOWN = 0.05  # of the contrast, by which the blur's logarithm is held there
 _LONGEST = np.array([0.3, 0.3, 0.2, 0.2, 0.5, np.inf, np.inf])  # step of each unknown of `_samples`
 _FARTHEST = 0.3
-"""From a saddle to where its edges cross [samples]: what samples pull at most, and noise."""
+"""Largest distance from a saddle to its edges' crossing [samples]: the pull of samples, and noise."""
 
 
 def crossed(picture: np.ndarray, saddles: np.ndarray, radius: int) -> np.ndarray:
-    """Where the edges of saddles (n, 2) cross, by samples within `radius`, without the samples' pull.
+    """Crossings of the edges of saddles (n, 2), by samples within `radius`, without the samples' pull.
 
     Saddles whose edges are not found near them stay: such as those so blurred that samples do not pull.
 

@@ -1,4 +1,4 @@
-"""What a sensor is, from pairs of flat and of dark images: EMVA 1288's photon transfer."""
+"""Properties of a sensor from pairs of flat and of dark images: EMVA 1288's photon transfer."""
 
 import math
 import warnings
@@ -72,7 +72,7 @@ class PhotonTransfer:
 
 @dataclass(frozen=True, slots=True)
 class _Moments:
-    """Of a pair of images of one scene: what is alike and what differs between them."""
+    """Moments of a pair of images of one scene: what is alike and what differs between them."""
 
     mean: float
     variance: float
@@ -107,7 +107,7 @@ def photon_transfer(
     darks
         Pairs without light. The first has the flats' exposure time; with `exposure_times` more may follow.
     exposure_times
-        Of the darks [s], at least two different ones: they tell dark current from black level.
+        Of the darks [s], at least two different ones: they separate dark current from black level.
     highest
         Largest number that the sensor reads; None takes it from the bit depth of raw images, and without one
         looks for no saturation.
@@ -265,7 +265,7 @@ def _dark_current(
 
 
 def _prnu(lit: Sequence[_Moments], dark: _Moments, fitted: np.ndarray, top: float) -> float:
-    """At half of saturation, or at the brightest flat of the fit if that is not known."""
+    """PRNU at half of saturation, or at the brightest flat of the fit if that is not known."""
     goal = (dark.mean + top) / 2 if math.isfinite(top) else math.inf
     usable = [each for each, used in zip(lit, fitted, strict=True) if used]
     flat = (

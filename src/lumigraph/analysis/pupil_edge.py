@@ -1,4 +1,4 @@
-"""How sharply lenslets tell directions: the main lens' stop as their micro-images show it."""
+"""Directional resolution of lenslets: the main lens' stop as their micro-images show it."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.errors import CalibrationError
 
 LEAST_PITCH = 6.0
-"""Of micro-images [px]: smaller ones have no profile."""
+"""Least pitch of micro-images [px]: smaller ones have no profile."""
 
 _STRIP = 0.06  # pitches on either side of the line between two centres, or half a pixel
 _BIN = 0.1  # px along it
@@ -53,7 +53,7 @@ class PupilEdge:
 
     @property
     def directions(self) -> float:
-        """Directions that are told apart across a micro-image: its width over the blur."""
+        """Directions that are resolved across a micro-image: its width over the blur."""
         return self.width / self.blur
 
     @property
@@ -83,8 +83,8 @@ def pupil_edge(white: np.ndarray, calibration: Calibration, kind: int | None = N
 
     .. math:: B + A\,\big[\Phi((h - t)/\sigma) + \Phi((t - P + h)/\sigma)\big]
 
-    B is 0 where micro-images touch, which cannot tell a floor from their sum. Pitches are not whole numbers
-    of pixels, so that many micro-images together sample the profile more finely than the pixels do.
+    B is 0 where micro-images touch: there a floor cannot be separated from their sum. Pitches are not whole
+    numbers of pixels, so that many micro-images together sample the profile more finely than the pixels do.
     Intervals come from the scatter over four sectors of the picture.
 
     Parameters
@@ -177,7 +177,7 @@ def _profile(
 
 
 def strip(pitch: float) -> float:
-    """How far from the line between two centres light counts [px]."""
+    """Distance from the line between two centres within which light counts [px]."""
     return max(0.5, _STRIP * pitch)
 
 

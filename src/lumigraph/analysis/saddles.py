@@ -67,14 +67,14 @@ def _odd(values: np.ndarray) -> np.ndarray:
 
 
 def quadratic(y: np.ndarray, x: np.ndarray, width: float) -> np.ndarray:
-    """From values (n, k) to the terms (n, 6) of the quadratic 1, y, x, y²/2, yx, x²/2 that fits them best."""
+    """Matrix (k, 6) from values (n, k) to the quadratic 1, y, x, y²/2, yx, x²/2 that fits them best."""
     weight = np.exp(-(y**2 + x**2) / (4 * width**2))  # its square is a Gaussian of `width`
     terms = np.stack([np.ones_like(y), y, x, y * y / 2, y * x, x * x / 2], 1)
     return (np.linalg.pinv(terms * weight[:, None]) * weight).T
 
 
 def _towards_rest(terms: np.ndarray, dots: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Step (n, 2) [px], at most 1, to where the gradient is 0, and which quadratics are saddles (hollows)."""
+    """Step (n, 2) [px], at most 1, to where the gradient is 0, and a mask of saddles (or hollows)."""
     _, gy, gx, yy, yx, xx = terms.T
     determinant = yy * xx - yx**2
     right = (determinant > 0) & (yy > 0) if dots else determinant < 0

@@ -1,4 +1,4 @@
-"""How far an image is from what it should be."""
+"""Error of an image against a reference."""
 
 import math
 

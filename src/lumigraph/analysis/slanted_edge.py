@@ -1,4 +1,4 @@
-"""How sharp a picture is, from one slanted edge in it: ISO 12233's e-SFR."""
+"""Sharpness of a picture by one slanted edge in it: ISO 12233's e-SFR."""
 
 import math
 from dataclasses import dataclass
@@ -125,7 +125,7 @@ def _upright(data: np.ndarray) -> np.ndarray:
 
 
 def _line(data: np.ndarray, degree: int) -> tuple[np.polynomial.Polynomial, tuple[float, float]]:
-    """Where the edge crosses each row, as a polynomial of the row from the middle; dark and bright level."""
+    """Polynomial of the edge's crossing of each row, by the row from the middle; dark and bright level."""
     rows, columns = data.shape
     side = max(2, columns // 8)
     left, right = data[:, :side], data[:, -side:]

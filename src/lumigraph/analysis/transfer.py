@@ -1,4 +1,4 @@
-"""How much of each frequency an image keeps."""
+"""Modulation transfer: the part of each frequency that an image keeps."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""From a white image to the places of its micro-images.
+"""Calibration: positions of the micro-images, from a white image.
 
 - `lattice_fit`: `calibrate`, from what is given to a `Calibration`
 - `whole`: the lattice of one picture: period, spots, robust fit

@@ -60,7 +60,7 @@ class Peaks:
         self.heights = tops[keep][order]
 
     def dips(self, index: int) -> bool:
-        """Whether the autocorrelation falls and rises again between lag 0 and this peak."""
+        """True if the autocorrelation falls and rises again between lag 0 and this peak."""
         steps = np.linspace(0, 1, max(8, int(self.lengths[index])))
         zero = self.correlation.shape[1] // 2
         y, x = self.lags[index][:, None] * steps

@@ -1,4 +1,4 @@
-"""Where micro-images meet on a raw image that has no dark gaps between them: `aligned`."""
+"""Borders between micro-images on a raw image without dark gaps: `aligned`."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -66,7 +66,7 @@ def aligned(calibration: Calibration, raw: RawImage | Array) -> Calibration:
 
 
 def border(feature: np.ndarray, model: Calibration) -> Border:
-    """Where a feature (y, x), edges or gaps, gathers in the cell of a lattice."""
+    """Position of a feature (y, x), edges or gaps, within the cell of a lattice."""
     (ny, nx), lattice = (n // 2 * 2 for n in feature.shape), model.lattice  # quarters of one size
     cells = []
     for rows in (slice(0, ny // 2), slice(ny // 2, ny)):

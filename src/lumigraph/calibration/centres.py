@@ -35,7 +35,7 @@ class Tried(NamedTuple):
 
 
 def lit(*tried: Tried) -> Spots:
-    """Those near their place that are bright and have dark edges, of all parts of a picture together."""
+    """Spots near their expected place that are bright and have dark edges, of all parts of a picture."""
     indices, centers, light, near = (np.concatenate(column) for column in zip(*tried, strict=True))
     keep = _lit(light) & near
     return Spots(indices[keep], centers[keep], light[keep, 0])
@@ -65,11 +65,11 @@ def measured(
     picture
         Flattened white image (y, x), zero in the dark.
     model
-        Where the micro-images are, to a third of a pitch [px].
+        Approximate positions of the micro-images, to a third of a pitch [px].
     part
         Central part of the picture's height and width to look at.
     rounds
-        In which the window follows the centre.
+        Number of rounds in which the window follows the centre.
     """
     cell = _cell(model.lattice)
     ny, nx = picture.shape
@@ -214,7 +214,7 @@ def _centre(
 
 
 def _lit(light: np.ndarray) -> np.ndarray:
-    """Which micro-images are bright and have dark edges; a tenth of a good one is enough."""
+    """True for micro-images that are bright and have dark edges; a tenth of a good one is enough."""
     if not len(light):
         return np.zeros(0, bool)
     good = np.percentile(light, 80, axis=0)

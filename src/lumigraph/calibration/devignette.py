@@ -116,7 +116,7 @@ def grey(white: RawImage) -> np.ndarray:
 
 
 def _phases(bayer: str | None) -> list[tuple[slice, slice]]:
-    """Where each of the four Bayer colours stands; the whole picture without a pattern."""
+    """Slices of the four Bayer colours; one of the whole picture without a pattern."""
     if bayer is None:
         return [(slice(None), slice(None))]
     return [(slice(row, None, 2), slice(column, None, 2)) for row in (0, 1) for column in (0, 1)]

@@ -1,4 +1,4 @@
-"""What a white image says about how a camera is put together: `diagnose` names the fault."""
+"""Diagnosis of a camera's assembly from a white image: `diagnose` names the fault."""
 
 import math
 from collections.abc import Sequence
@@ -22,14 +22,14 @@ LEAST_ROTATION = math.radians(0.02)
 LEAST_OFFSET = 0.25
 """Pixels."""
 LEAST_STRETCH = 3e-4
-"""Of the pitch."""
+"""Smallest relative change of the pitch that is a fault."""
 LEAST_TILT = math.radians(0.1)
 LEAST_BEND = 0.02
 """Pixels that a tilt moves centres at the border: half of what a neighbour that is missing there does."""
 LEAST_PULL = 0.05
 """The same of another pitch: what overlapping neighbours that are missing on all sides do."""
 LEAST_GAP = 0.03
-"""Of the pitch. Below these limits a difference is no fault."""
+"""Smallest gap over the pitch. Below these limits a difference is no fault."""
 
 _CELL = 32  # samples of a folded micro-image per axis
 _SIGMAS = 4.0  # of their standard errors must pitch and tilt differ, too
@@ -49,34 +49,34 @@ class _Lenslets(Protocol):
 
 
 class Built(Protocol):
-    """What `diagnose` asks of a camera: how it was meant to be."""
+    """Protocol of a camera that `diagnose` compares with: its design."""
 
     @cached_property
     def calibration(self) -> Calibration:
-        """Where micro-images were meant to stand [px]."""
+        """Design positions of the micro-images [px]."""
         ...
 
     @property
     def lenslets(self) -> _Lenslets:
-        """Their pitch and focal lengths [m], and shape."""
+        """Pitch and focal lengths of the lenslets [m], and their shape."""
         ...
 
     @property
     def wavelength(self) -> float:
-        """In vacuum [m]."""
+        """Wavelength in vacuum [m]."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """How a camera differs from what it was meant to be, in the frame of its raw image.
+    """Deviations of a camera from its design, in the frame of its raw image.
 
     Parameters
     ----------
     rotation
-        Of the lenslets, from +x towards +y [rad].
+        Rotation of the lenslets, from +x towards +y [rad].
     offset
-        Of the micro-image nearest to the axis (y, x) [m]; whole pitches cannot be seen.
+        Offset of the micro-image nearest to the axis (y, x) [m]; whole pitches cannot be seen.
     lenslet_distance
         Lenslets to sensor that explain the pitch, b [m].
     intended_distance
@@ -87,11 +87,11 @@ class Diagnosis:
     pitch_gradient
         Change of the pitch over the height and width of the picture (y, x) [m], which the tilt explains.
     width
-        Of the micro-images by ray optics: the main lens seen through a lenslet [m].
+        Width of the micro-images by ray optics: the main lens seen through a lenslet [m].
     gap
         Pitch minus width [m]: dark between micro-images, below 0 an overlap.
     diameter, matching_diameter
-        Of the main lens: that explains the width, and with which micro-images would touch [m].
+        Diameter of the main lens that explains the width, and the one with which micro-images touch [m].
     faults
         The names of what is wrong; empty for a good camera.
     """
@@ -130,7 +130,7 @@ class Diagnosis:
 
 
 def diagnose(white: RawImage | Array, camera: Built) -> Diagnosis:
-    r"""What is wrong with the camera that took a white image.
+    r"""Faults in the assembly of the camera that took a white image.
 
     The lattice gives rotation, offset and, by its pitch p (1 + b/L), the distance b. A tilted array has
     another b for each lenslet: with T = L + b, micro-images stand at
@@ -145,7 +145,7 @@ def diagnose(white: RawImage | Array, camera: Built) -> Diagnosis:
     white
         Picture of an evenly lit surface, of the camera's sensor.
     camera
-        How it was meant to be, such as an instrument.
+        Intended camera, such as an instrument.
 
     Micro-images 1.22 pitches wide leave no contrast between them and the places in between: near it, from
     1.17 to 1.27, the distance is not reliable. Where the array ends near the border of the picture, missing
@@ -204,7 +204,7 @@ def _lengths(intended: Calibration) -> tuple[float, float, float]:
     if pixel is None or separation is None or distance is None:
         raise CalibrationError(
             "the camera's pixel_pitch, separation or lenslet_distance is not known, and a white image alone "
-            "does not tell them. Give a camera that has all three."
+            "does not show them. Give a camera that has all three."
         )
     return pixel, separation, distance
 
@@ -274,7 +274,7 @@ def _between(lattice: Lattice) -> Lattice:
 
 
 class _Blur:
-    """How a lenslet blurs the main lens, as a function of the lattice's harmonics."""
+    """Blur of the main lens' image by a lenslet, as a function of the lattice's harmonics."""
 
     def __init__(self, camera: Built, distances: tuple[float, float], pitch: float) -> None:
         b, separation = distances
@@ -319,7 +319,7 @@ def _mean_cell(picture: np.ndarray, lattice: Lattice) -> np.ndarray:
 def _width(cell: np.ndarray, blur: _Blur) -> tuple[float, bool]:
     """Width of the micro-images over the pitch, and whether the lattice stands between them.
 
-    It is that of the disc whose harmonics, blurred, are those of the cell. Harmonics see overlapping
+    It is that of the disc whose harmonics, blurred, are those of the cell. Harmonics show overlapping
     micro-images too: light adds up. Beyond 1.22 pitches the brightest places are between micro-images.
     """
     spectrum = np.fft.fft2(cell) / cell.sum()

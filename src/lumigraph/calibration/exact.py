@@ -21,11 +21,11 @@ def exactly(found: Calibration, pitch: float, rotation: float = 0.0) -> Calibrat
     Parameters
     ----------
     found
-        As `calibrate` found it.
+        Calibration found by `calibrate`.
     pitch
         Distance of neighbouring micro-images [px].
     rotation
-        Of the rows of lenslets from +x towards +y [rad].
+        Direction of the rows of lenslets from +x towards +y [rad].
 
     Raises
     ------

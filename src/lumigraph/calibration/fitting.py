@@ -33,7 +33,7 @@ class Fitted(NamedTuple):
     warp: Warp | None
 
     def model(self, shape: tuple[int, int]) -> Calibration:
-        """As a calibration without tables, which knows places."""
+        """Calibration without tables of indices and centres, for its positions."""
         none = np.zeros((0, 2), np.int64)
         return Calibration(self.lattice, shape, none, none.astype(float), 0.0, warp=self.warp)
 
@@ -54,7 +54,7 @@ def fit(spots: Spots, model: Calibration, *, warped: bool = True) -> Fitted:
     model
         The lattice so far.
     warped
-        Whether tilt and distortion may be fitted.
+        True to fit tilt and distortion, too.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def _robust(spots: Spots, model: Calibration, free: tuple[bool, bool]) -> Fitted
 
 
 def _flat(indices: np.ndarray) -> bool:
-    """Whether indices lie on one line, or are too few for a warp."""
+    """True if indices lie on one line, or are too few for a warp."""
     design = np.concatenate([np.ones((len(indices), 1)), indices], -1)
     return len(indices) < 9 or np.linalg.matrix_rank(design) < 3
 
@@ -208,7 +208,7 @@ def _check(fitted: Fitted, spots: Spots, shape: tuple[int, int]) -> None:
 
 
 def _quartered(centers: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """How many micro-images stand in each quarter of a picture (4,)."""
+    """Number of micro-images in each quarter of a picture (4,)."""
     lower = centers > np.array(shape) / 2
     return np.bincount(2 * lower[:, 0] + lower[:, 1], minlength=4)
 

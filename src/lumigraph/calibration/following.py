@@ -20,14 +20,14 @@ _SHARPEST, _HIGHEST = 0.14, 4.0  # 1/px, and orders, of the lines that gaps have
 
 
 class Followed(NamedTuple):
-    """What a feature repeats on.
+    """Lattice on which a feature repeats.
 
     Parameters
     ----------
     basis
         Lattice vectors (y, x) of i and j in columns [px].
     evidence
-        Of its lines over their surroundings.
+        Strength of its lines over their surroundings.
     errors
         Standard errors (2, 2) of the waves of i and j along y and x [1/px], by how far the lines scatter
         about those of one lattice; NaN of two lines alone.
@@ -48,7 +48,7 @@ def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> Followed |
     basis
         Lattice vectors (y, x) of i and j in columns [px].
     is_hex
-        Whether there are three first harmonics.
+        True if there are three first harmonics.
 
     Returns
     -------
@@ -102,7 +102,7 @@ class _Lines:
 
 
 def _top(before: np.ndarray, here: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Where a parabola through three samples is highest, from the middle one."""
+    """Offset of a parabola's maximum from the middle one of three samples [samples]."""
     return np.clip((after - before) / (2 * np.maximum(2 * here - before - after, 1e-6)), -0.6, 0.6)
 
 
@@ -151,7 +151,7 @@ def _first(waves: np.ndarray, is_hex: bool) -> np.ndarray:
 
 
 def _is_peak(score: np.ndarray) -> np.ndarray:
-    """Where a score is the highest of its surroundings, but not at the border."""
+    """True where a score is the highest of its surroundings, but not at the border."""
     found = score == ndimage.maximum_filter(score, 3)
     found[[0, -1]] = found[:, [0, -1]] = False
     return found

@@ -1,4 +1,4 @@
-"""From a white image, or a raw image alone, to the places of its micro-images."""
+"""Calibration from a white image, or from a raw image alone: `calibrate`."""
 
 import math
 from collections.abc import Sequence
@@ -52,9 +52,9 @@ def calibrate(
     pitch
         Distance of neighbouring micro-images [px], to 10 %; found by itself where None.
     rotation
-        Of the rows of lenslets from +x towards +y [rad], to 2°; found by itself where None.
+        Direction of the rows of lenslets from +x towards +y [rad], to 2°; found by itself where None.
     pixel_pitch
-        Of the sensor [m]; the white image's own where None.
+        Pixel pitch of the sensor [m]; the white image's own where None.
     separation, lenslet_distance
         Main lens to lenslets and lenslets to sensor [m], where known: kept in the result, which `decode`
         and `rendered_grid` need for lengths in metres.
@@ -101,7 +101,7 @@ def calibrate(
 
 
 def _overexposed(image: RawImage, model: Calibration, indices: np.ndarray) -> tuple[str, ...]:
-    """What is to be known of micro-images at the top of the range."""
+    """Note about micro-images at the top of the range."""
     if not (many := saturated(image, model, indices)):
         return ()
     return (

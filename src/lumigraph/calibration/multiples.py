@@ -14,7 +14,7 @@ _ABSENT = 0.12  # of the weakest first harmonic of the finer, or better, lattice
 _ALIKE = 0.55  # correlation of lenslets of several kinds; touching discs of one kind reach 0.46
 _COARSEST = 9  # cells of the finer lattice in one of the coarser
 AROUND = 0.04
-"""Of a pitch, within which polishing one candidate finds the other."""
+"""Part of a pitch within which polishing one candidate finds the other."""
 _SUBLATTICES = [
     (a, b, n // a)
     for n in range(_COARSEST, 1, -1)
@@ -43,7 +43,7 @@ def finest(light: Gaps, vectors: Vectors) -> Vectors:
 
 
 def _absent(light: Gaps, coarse: np.ndarray, finer: Vectors) -> bool:
-    """Whether the light has no harmonics, to the order of the finer lattice's first, but its own."""
+    """True if the light has only its own harmonics, to the order of the finer lattice's first."""
     fine = np.stack([finer.column, finer.row], -1)
     steps = np.stack(np.meshgrid(*2 * [np.arange(-5, 6)], indexing="ij"), -1).reshape(-1, 2)
     waves = steps @ np.linalg.inv(coarse)
@@ -105,7 +105,7 @@ def without_beats(found: list[Vectors], pictures: tuple[Gaps, ...]) -> list[Vect
 
 
 def _beats(pictures: tuple[Gaps, ...], vectors: Vectors, finer: Vectors) -> bool:
-    """Whether a candidate is coarser than another, faint beside it, and more than a few of its cells."""
+    """True if a candidate is coarser than another, faint beside it, and more than a few of its cells."""
     if vectors.area < 1.05 * finer.area or not all(faint(one, vectors, finer) for one in pictures):
         return False
     steps = np.linalg.solve(
@@ -115,7 +115,7 @@ def _beats(pictures: tuple[Gaps, ...], vectors: Vectors, finer: Vectors) -> bool
 
 
 def faint(picture: Gaps, vectors: Vectors, best: Vectors) -> bool:
-    """Whether a candidate's first harmonics are next to nothing beside those of the best one.
+    """True if a candidate's first harmonics are negligible beside those of the best one.
 
     Lines count by how far they stand out of their surroundings: on a clean picture, a coarser lattice has
     one at each beat of the true one with the pixels or with a pattern of dead lenslets.

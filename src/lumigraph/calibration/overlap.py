@@ -1,4 +1,4 @@
-"""Where micro-images stand whose discs overlap: beyond a size, the brightest places are between them."""
+"""Centres of micro-images whose discs overlap: beyond a size, the brightest places are between them."""
 
 import math
 from typing import NamedTuple
@@ -12,9 +12,9 @@ from lumigraph.calibration.template import sharpened
 from lumigraph.core.lattice import Lattice
 
 SIZES = np.arange(0.5, 1.6, 0.01)
-"""Of discs over the pitch that are tried."""
+"""Sizes of discs over the pitch that are tried."""
 VANISHING = {"hex": 1.045, "square": 1.19}
-"""Of discs over the pitch, before their first harmonic vanishes and changes its sign (1.056 and 1.22)."""
+"""Sizes of discs over the pitch, before their first harmonic changes its sign (1.056 and 1.22)."""
 
 _PLACES = 48  # along each side of the cell where discs are tried
 _ORDERS = 3.2  # harmonics that are compared

@@ -34,18 +34,18 @@ _SIZE = 2048  # px of the middle of the picture that is looked at
 
 
 class Request(NamedTuple):
-    """What the caller knows: layout, pitch [px] to 10 %, rotation [rad] to 2°."""
+    """Constraints given by the caller: layout, pitch [px] to 10 %, rotation [rad] to 2°."""
 
     layout: Layout | None = None
     pitch: float | None = None
     rotation: float | None = None
 
     def near(self, vectors: Vectors) -> bool:
-        """Whether a candidate is worth looking at: it may be beaten, but not ten times as coarse."""
+        """True if a candidate is worth a look: it may lose to others, but is not ten times as coarse."""
         return self.pitch is None or 0.4 * self.pitch < math.sqrt(vectors.area) < 2.5 * self.pitch
 
     def allows(self, vectors: Vectors, slack: float = 0.0) -> bool:
-        """Whether a candidate is what was asked for; slack [rad] is its own uncertainty."""
+        """True if a candidate is what was asked for; slack [rad] is its own uncertainty."""
         pitch = (math.hypot(*vectors.row) + math.hypot(*vectors.column)) / 2
         if self.layout not in (None, vectors.layout):
             return False

@@ -1,4 +1,4 @@
-"""What a lattice alone does not tell: how much of each micro-image is lit, and which kind is sharp."""
+"""Quality beyond the lattice: how much of each micro-image is lit, and which kind is sharp."""
 
 import numpy as np
 from scipy import ndimage
@@ -22,7 +22,7 @@ def fill_of(cell: np.ndarray) -> float | None:
 
 
 def _near(size: int, part: float) -> np.ndarray:
-    """Which samples of a cell lie within a part of the pitch of its centre, which is its first sample."""
+    """True for samples of a cell within a part of the pitch of its centre, which is its first sample."""
     k = np.minimum(np.arange(size), size - np.arange(size)) / size
     return k[:, None] ** 2 + k**2 <= part**2
 

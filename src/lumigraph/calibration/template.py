@@ -116,13 +116,13 @@ def _rows(tables: np.ndarray, model: Calibration, away: np.ndarray, clear: np.nd
     Parameters
     ----------
     tables
-        Of the mean micro-image.
+        Integral tables of the mean micro-image.
     model
         Lattice.
     away
         Centres (k, 2) from the middle pixel [px].
     clear
-        How many pixels there are above, left, below and right (k, 4).
+        Number of pixels there are above, left, below and right (k, 4).
     """
     inverse, reach, fine = np.linalg.inv(model.lattice.matrix), _reach(model), math.isqrt(len(tables))
     steps = np.arange(-reach, reach + 1)

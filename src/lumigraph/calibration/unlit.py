@@ -1,4 +1,4 @@
-"""Which lenslets do not send light as they should, judged by their light alone: `unlit`, `saturated`."""
+"""Dark, faint and saturated lenslets, judged by their light alone: `unlit`, `saturated`."""
 
 import numpy as np
 from scipy import ndimage
@@ -22,11 +22,11 @@ def unlit(picture: np.ndarray, model: Calibration, centers: np.ndarray, *, white
     picture
         Brightness (y, x).
     model
-        Where the micro-images stand.
+        Positions of the micro-images.
     centers
-        Of those that were found (k, 2) [px]: lenslets between the outermost of them are judged.
+        Centres that were found (k, 2) [px]: lenslets between the outermost of them are judged.
     white
-        Whether the picture is evenly lit. Then a lenslet with less than a tenth of a lit one's light is
+        True for an evenly lit picture. Then a lenslet with less than a tenth of a lit one's light is
         dark. A scene has dark places that are no faults: there a dark lenslet has less than a tenth of what
         three quarters of those around it have.
     """
@@ -44,7 +44,7 @@ def unlit(picture: np.ndarray, model: Calibration, centers: np.ndarray, *, white
 
 
 def saturated(image: RawImage, model: Calibration, indices: np.ndarray) -> int:
-    """How many lenslets (k, 2) are at the top of a picture's range over half of their middle."""
+    """Number of lenslets (k, 2) at the top of a picture's range over half of their middle."""
     if image.bit_depth is None:
         return 0
     data = to_numpy(image.data)

@@ -35,11 +35,11 @@ class Vectors(NamedTuple):
 
     @property
     def area(self) -> float:
-        """Of a cell [px²]."""
+        """Area of a cell [px²]."""
         return abs(float(self.row[0] * self.column[1] - self.row[1] * self.column[0]))
 
     def same(self, other: "Vectors", slack: float) -> bool:
-        """Whether two bases span one lattice, to a part of a pitch."""
+        """True if two bases span one lattice, to a part of a pitch."""
         matrix = np.stack([other.row, other.column], -1)
         steps = np.linalg.solve(matrix, np.stack([self.row, self.column], -1))
         whole = np.rint(steps)

@@ -38,7 +38,7 @@ _UNMEASURED = (
 
 
 How = Literal["light", "sharp", "gaps", "logarithm", "discs", "nothing"]
-"""How centres were found: first harmonics of the light, the mean micro-image, the dark gaps, the logarithm
+"""Source of the centres: first harmonics of the light, the mean micro-image, the dark gaps, the logarithm
 of the picture, overlapping discs; or nothing, where none was measured."""
 
 
@@ -57,7 +57,7 @@ class Found(NamedTuple):
 
     @property
     def measured(self) -> bool:
-        """Whether single centres were."""
+        """True if single centres were measured."""
         return self.how != "nothing"
 
 
@@ -149,7 +149,7 @@ def _followed(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, vectors:
 
 
 def _agrees(fitted: Fitted, vectors: Vectors) -> bool:
-    """Whether a fit kept to the lattice that all harmonics tell, but for two pitches and shear."""
+    """True if a fit kept to the lattice of all harmonics, apart from two pitches and shear."""
     steps = np.linalg.solve(
         np.stack([vectors.row, vectors.column]).T,
         np.array([fitted.lattice.basis[0], fitted.lattice.basis[1]]).T,

@@ -1,4 +1,4 @@
-"""What `lumigraph deconvolve` is told of aberrations to find, and what it reports of them."""
+"""Options of `lumigraph deconvolve` for unknown aberrations, and its report of them."""
 
 import math
 import re
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from lumigraph.instruments import Instrument, LightFieldMicroscope
 
 TERMS = "5-11"
-"""Unless others are asked for: up to coma, trefoil and spherical aberration."""
+"""Default terms: up to coma, trefoil and spherical aberration."""
 
 FLAT = "4-11"
 """The same of a picture at a known depth: with defocus."""
 
 HIGHEST = 66
-"""Noll index: order 10. More of them than a light field tells."""
+"""Highest Noll index, order 10: more than a light field can determine."""
 
 
 def indices(text: str) -> tuple[int, ...]:
@@ -51,19 +51,19 @@ def indices(text: str) -> tuple[int, ...]:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Adaptive:
-    """Aberrations that are found first.
+    """Aberrations to find before the object.
 
     Parameters
     ----------
     adaptive
-        Find the aberrations of a microscope or of a camera of kind plenoptic from the raw image, of several
-        pages from the first, and deconvolve with them. Takes minutes.
+        Find the aberrations of a microscope or of a camera of kind plenoptic from the raw image, or the first
+        of several pages, and deconvolve with them. Takes minutes.
     terms
-        Noll indices of the Zernike terms that are looked for, such as 5,6,8; left out, 5-11, of a
-        picture 4-11.
+        Noll indices of the Zernike terms to find, such as 5,6,8; left out, 5-11, or 4-11 for a
+        picture.
     object
-        What the raw image shows: volume, anything with texture; picture, something flat at one known depth;
-        beads, sparse points. A volume if left out, of cameras a picture.
+        Content of the raw image: volume, anything with texture; picture, something flat at one known depth;
+        beads, sparse points. Left out, a volume, or for cameras a picture.
     """
 
     adaptive: Annotated[bool, Parameter(negative="")] = False
@@ -85,7 +85,7 @@ class Adaptive:
     def found(
         self, raw: "PreparedImage", camera: "Instrument", planes: tuple[float, ...] | None, shown: Progress
     ) -> "Wavefront | None":
-        """The wavefront, if it is asked for; cameras that have none are refused by `estimate`."""
+        """Wavefront, if requested; `estimate` refuses cameras that have none."""
         if not self.adaptive:
             return None
         from lumigraph.adaptive import estimate
@@ -121,7 +121,7 @@ def signed(value: float, deviation: float) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Modes:
-    """Zernike terms that were found, as the command line says them.
+    """Zernike terms that were found, in the form of the report.
 
     Parameters
     ----------
@@ -140,24 +140,24 @@ class Modes:
 
     @classmethod
     def of(cls, found: "Wavefront") -> "Modes":
-        """Of a wavefront, in the mean over the field."""
+        """Modes of a wavefront, averaged over the field."""
         deviations = dict(zip(found.terms, found.deviations.mean((0, 1)).tolist(), strict=True))
         return cls(found.coefficients, deviations, found.untold, found.explained)
 
     @property
     def rms(self) -> float:
-        """Of the wavefront [waves]."""
+        """Rms of the wavefront [waves]."""
         return math.hypot(*self.coefficients.values())
 
     def lines(self) -> tuple[str, ...]:
-        """For people."""
+        """Lines for people."""
         known = (signed(c, self.deviations[j]) for j, c in self.coefficients.items())
         text = ", ".join(f"Z{j} {c} ± {d}" for j, (c, d) in zip(self.coefficients, known, strict=True))
         untold = (f"Z{j} is not known: {reason}" for j, reason in self.untold.items())
         return (f"wavefront of {self.rms:.3f} waves rms: {text}", *untold)
 
     def values(self) -> dict[str, Any]:
-        """For programs."""
+        """Values for programs."""
         terms = {
             str(j): {"waves": c, "deviation": self.deviations[j], "explained": self.explained.get(j)}
             for j, c in self.coefficients.items()
@@ -210,7 +210,7 @@ def with_wavefront(result: Result, found: "Wavefront") -> Result:
 
 
 def _widths(found: "Wavefront") -> "Iterator[Quantity]":
-    """Of beads that are balls, within one standard deviation."""
+    """Width of beads that are balls, with an interval of one standard deviation."""
     if width := found.bead_width:
         deviation = found.bead_width_deviation
         yield Quantity("bead_width", width, "m", (max(0.0, width - deviation), width + deviation))

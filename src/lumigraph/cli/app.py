@@ -55,7 +55,7 @@ VERBS = (
     measure, batch, sweep, optimise, tolerance, dataset, board, convert, chart, datasheet, twin, view,
     samples, catalogue, reproduce,
 )  # fmt: skip
-"""In the order of their use."""
+"""Verbs in the order of their use."""
 
 
 app = App(
@@ -140,7 +140,7 @@ def _optional(text: str) -> str:
 
 
 def _usage(error: CycloptsError) -> str:
-    """What was written wrongly, and where help is."""
+    """Message about a wrong command line, with a pointer to the help."""
     if isinstance(error, UnknownCommandError) and error.unused_tokens:
         return _unknown(error.unused_tokens[0])
     verb = " ".join(error.command_chain or ())
@@ -150,7 +150,7 @@ def _usage(error: CycloptsError) -> str:
 
 
 def _missing(error: MissingArgumentError, verb: str) -> str:
-    """What a verb, or one of its options, was not given."""
+    """Message about an argument or a value that is missing."""
     if error.argument is None:
         return str(error)
     given = error.keyword or next((token.keyword for token in error.argument.tokens if token.keyword), None)
@@ -188,6 +188,6 @@ def _say(text: str) -> None:
 
 
 def _discard_output() -> None:
-    """Let what is still to be written go nowhere."""
+    """Discard all further output."""
     with suppress(AttributeError, OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

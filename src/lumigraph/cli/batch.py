@@ -30,13 +30,13 @@ RUN = 16
 
 _STATUS = "status"
 _SHOWN = 5
-"""Failures that are told one by one."""
+"""Number of failures that are listed one by one."""
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Hands:
-    """Who does it.
+    """Workers that do the job.
 
     Parameters
     ----------
@@ -45,11 +45,11 @@ class Hands:
     scheduler
         Address of a running dask cluster instead, such as tcp://10.0.0.1:8786.
     slurm
-        Hand it to SLURM instead, as an array of so many jobs.
+        Submit to SLURM instead, as an array of so many jobs.
     sbatch
         More options of those jobs, such as "--time=2:00:00 --mem=8G".
     part
-        Which of how many equal parts of the frames to do, such as 3/10, as the jobs of a queue share them.
+        Part of the frames to do, of how many equal ones, such as 3/10, as the jobs of a queue share them.
     """
 
     workers: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
@@ -83,7 +83,7 @@ class Hands:
         return Result("Batch", "A job array.", number, (told,), values)
 
     def cluster(self) -> "Cluster":
-        """Where the workers are found."""
+        """Cluster of the workers."""
         from lumigraph import cluster
         from lumigraph.core.arrays import WORKERS
 
@@ -114,9 +114,9 @@ def batch(
 ) -> Result:
     """Run another verb for each of many frames: pages of a stack, or files by a pattern.
 
-    The results become one Zarr store, OME-Zarr of volumes, which napari and others open while it grows; of
-    'measure' and 'calibrate' a table. What is done is noted beside it: kill it at any time, and the same
-    line goes on where it was. A frame that fails is noted and left out, and tried again by the next start.
+    The results become one Zarr store (volumes: OME-Zarr), which napari and others open while it grows;
+    those of 'measure' and 'calibrate' a table. Finished frames are recorded beside it. Safe to interrupt: run
+    the same command again to resume. Frames that fail are recorded, left out, and tried again then.
 
     Example: `lumigraph batch deconvolve film.tif --white white.tif --camera scope.toml --iterations 8 -o volumes.ome.zarr`
 
@@ -129,13 +129,13 @@ def batch(
     verb
         simulate, decode, render, refocus, depth, deconvolve, calibrate or measure; or status.
     words
-        The verb's own: files or patterns in quotes first, then its options.
+        Arguments of the verb: files or patterns in quotes first, then its options.
     output
         Zarr store (.zarr), or table (.csv, .parquet).
     page
         Pages of a stack, such as '3:9', '3-9' or 3, counted from 0; all if left out.
     run
-        With the --warm of 'deconvolve', frames in a row that one worker does, the first one cold: more are
+        Number of frames in a row for one worker with the --warm of 'deconvolve', the first one cold: more are
         better for the last ones, fewer for many workers.
     """  # noqa: E501 - an example is one line
     from lumigraph import cluster
@@ -234,7 +234,7 @@ def _only(words: Sequence[str]) -> Path:
 
 
 def _failures(found: "Report") -> str:
-    """How many frames failed, and why: the first reasons, each with its first frames."""
+    """Number of failed frames, and the first reasons, each with its first frames."""
     reasons: dict[str, list[int]] = {}
     for number, why in sorted(found.failures.items()):
         reasons.setdefault(why.rstrip("."), []).append(number)
@@ -245,7 +245,7 @@ def _failures(found: "Report") -> str:
 
 
 def _numbers(numbers: list[int]) -> str:
-    """Of frames.
+    """Numbers of frames as text.
 
     >>> _numbers([7]), _numbers([1, 2]), _numbers(list(range(10)))
     ('frame 7', 'frames 1, 2', 'frames 0, 1, 2, 3, 4 and 5 more')

@@ -22,38 +22,38 @@ if TYPE_CHECKING:
 
 
 _ARRAY = ("lenslet_pitch", "micro_images")
-"""What is known of the array, which `Nominal` takes as their ratio."""
+"""Values of the array, which `Nominal` takes as their ratio."""
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Known:
-    """What is known of the camera.
+    """Camera properties that are known beforehand.
 
     Parameters
     ----------
     focal_length
         Focal length of the main lens, such as '50 mm'; that of --camera if left out.
     focal_length_error
-        How well it is known, such as '1 mm'; 2 % if left out.
+        Standard error of the focal length, such as '1 mm'; 2 % if left out.
     pixel_pitch
         Pixel pitch of the sensor, such as '5.5 um'; that of the raw images or of --camera if left out.
     shape
         Rows and columns of the raw images, for a table of corners.
     lenslet_distance
-        From lenslets to sensor, such as '0.42 mm', of a camera 1.0 their focal length; that of --camera if
+        Lenslets to sensor, such as '0.42 mm', of a camera 1.0 their focal length; that of --camera if
         left out. It checks the board's spacing, which nothing else does.
     lenslet_distance_error
-        How well that is known, such as '0.02 mm'; 5 % if left out.
+        Standard error of that distance, such as '0.02 mm'; 5 % if left out.
     lenslet_pitch
-        Between lenslets, if it is known well, such as '125.02 um': with the pitch of the micro-images it
-        tells f and distances.
+        Pitch of the lenslets, if it is known well, such as '125.02 um': with the pitch of the micro-images it
+        gives f and distances.
     lenslet_pitch_error
-        How well that is known, such as '0.01 um'; 0.03 % if left out. With it, the pitch of --camera is used.
+        Standard error of the pitch, such as '0.01 um'; 0.03 % if left out. With it, --camera's pitch is used.
     micro_image_pitch
         Pixels between micro-images, for a table of corners; of raw images it is measured.
     wavelength
-        Of the light, such as '532 nm', for raw images: what lenslets of a camera 1.0 spill into their
+        Wavelength, such as '532 nm', for raw images: what lenslets of a camera 1.0 spill into their
         neighbours' micro-images, and how far outwards those of a camera 2.0 show corners, is allowed for.
         That of --camera, or 550 nm, if left out.
     """
@@ -70,7 +70,7 @@ class Known:
     wavelength: str | None = None
 
     def nominal(self, given: dict[str, Any]) -> "Nominal":
-        """Of the options, which come before what files say."""
+        """Nominal camera: options come before values from files."""
         from lumigraph.metric import Nominal
 
         apart, known = self._apart(given), self._lengths(given)
@@ -83,7 +83,7 @@ class Known:
         return nominal if error is None else replace(nominal, pitch_ratio_error=error / lenslets)
 
     def _lengths(self, given: dict[str, Any]) -> dict[str, Any]:
-        """What options and files say of main lens, sensor and b, by its names in `Nominal`."""
+        """Values of main lens, sensor and b from options and files, by their names in `Nominal`."""
         own = {
             name: length(f"--{name.replace('_', '-')}", getattr(self, name))
             for name in ("focal_length", "pixel_pitch", "lenslet_distance")
@@ -100,7 +100,7 @@ class Known:
         return known
 
     def _sure(self, nominal: "Nominal") -> "Nominal":
-        """With errors that are given as lengths."""
+        """Nominal camera with errors that are given as lengths."""
         f = length("--focal-length-error", self.focal_length_error)
         b = length("--lenslet-distance-error", self.lenslet_distance_error)
         if f is not None:
@@ -148,7 +148,7 @@ def board(
     lenslets show them, with the columns frame, corner, y, x, center_y, center_x, kind, and in_views of a
     camera 1.0; or one folder of COMPOTE's (bap.csv, centers.csv, camera.json, scene.json), which also says
     what the board and the camera are. Or the word plan: which pictures of the board to take with --camera,
-    and how well they will tell its lengths.
+    and how precise its lengths will be.
 
     Example: `lumigraph board plan --camera camera.toml --board "9 x 5 corners, 10 mm"`
 
@@ -173,9 +173,9 @@ def board(
     views
         The raw images are of a camera 1.0, whose views show the corners.
     table
-        Where to write the corners that were found on raw images (.csv).
+        File for the corners that were found on raw images (.csv).
     pictures
-        How many pictures to plan.
+        Number of pictures to plan.
     output
         File for the camera (.json), which lumigraph.metric.load reads.
     """
@@ -230,7 +230,7 @@ def _read(
 def _found(
     sources: tuple[Path, ...], board: "Board", origin: Origin, views: bool, wavelength: float | None
 ) -> "tuple[Corners, Board, dict[str, Any], tuple[str, ...]]":
-    """Of raw images."""
+    """Corners found in raw images, with the board, known values and notes."""
     from lumigraph import metric
     from lumigraph.instruments import LensletCamera
     from lumigraph.instruments.capabilities import Rendered, WithMainLens
@@ -254,7 +254,7 @@ def _found(
 
 
 def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int) -> Result:
-    """Pictures to take."""
+    """Plan of the pictures to take."""
     from lumigraph import metric
     from lumigraph.instruments import LensletCamera
     from lumigraph.instruments.capabilities import Rendered
@@ -280,7 +280,7 @@ def _planned(origin: Origin, board: "Board | None", known: Known, pictures: int)
 
 
 def _enough(found: "Plan") -> str:
-    """From which picture on lengths and distances are known to 1 %, and how well with all."""
+    """Number of pictures after which lengths and distances are known to 1 %, and their final errors."""
     from lumigraph.metric.calibration import WELL
 
     names, counts = ("f", "L", "b", "distances"), found.enough(WELL)
@@ -293,7 +293,7 @@ def _enough(found: "Plan") -> str:
 
 
 def _hardly_told(found: "Plan", nominal: "Nominal") -> tuple[str, ...]:
-    """A note where pictures tell f hardly better than it is known without them."""
+    """Note if the pictures hardly improve on the f that is known beforehand."""
     if found.steps[-1].errors[0] < 0.7 * nominal.focal_length_error * nominal.focal_length:
         return ()
     return (

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Bench:
-    """What is known of the camera.
+    """Camera properties that are known beforehand.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Bench:
     lenslet_distance
         Lenslets to sensor, such as '18.6 mm'.
     camera
-        Camera file that says all three.
+        Camera file with all three lengths.
     """
 
     pixel_pitch: str | None = None
@@ -61,7 +61,7 @@ class Bench:
         return known
 
     def compared(self, found: "Calibration") -> tuple[str, ...]:
-        """What the picture says about the camera of --camera, in a line."""
+        """Comparison of the picture with the camera of --camera, in a line."""
         from lumigraph.instruments import load_camera
         from lumigraph.preparation import implied
 
@@ -101,7 +101,7 @@ def calibrate(
     exact
         For a rectified picture: take --pitch and --rotation (0 if left out) as exact.
     explain
-        Say what to turn on the bench: rotation, shift, distance, tilt and aperture, against --camera.
+        Print the adjustments to make: rotation, shift, distance, tilt and aperture, against --camera.
     overlay
         Draw the lattice over the white image into this file (.png, .svg, .pdf).
     """
@@ -148,7 +148,7 @@ def calibrate(
 
 
 def _advice(white: "RawImage", bench: Bench) -> Any:
-    """What to turn on the bench."""
+    """Adjustments to make on the bench."""
     from lumigraph.calibration import diagnose
     from lumigraph.instruments import load_camera
     from lumigraph.instruments.lenslet_camera import LensletCamera

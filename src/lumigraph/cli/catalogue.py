@@ -21,7 +21,7 @@ _FIGURES = {
 def catalogue(*, common: Common = COMMON) -> Result:
     """List the cameras and microscopes that come with lumigraph, with their key figures.
 
-    Their names stand wherever a verb takes a camera file; `lumigraph design NAME` prints all that follows.
+    Every verb that takes a camera file accepts their names; `lumigraph design NAME` prints all that follows.
 
     Example: `lumigraph catalogue`
 

@@ -40,7 +40,7 @@ def chart(
     paper
         A4, A3, A2, letter, or width x height such as '300 mm x 200 mm'.
     turn
-        By which the chart is turned, such as '7 deg', clockwise.
+        Rotation of the chart, such as '7 deg', clockwise.
     output
         Page of true size (.pdf, .svg), or a picture of it (.png).
     """

@@ -89,7 +89,7 @@ class _Lines:
         self.task, self.began, self.next = task, time.monotonic(), FIRST_LINE
 
     def __call__(self, *, description: str = "", completed: float = 0.0, **_: object) -> None:
-        """Write what is done, if it is time to."""
+        """Write the fraction done, if it is time to."""
         passed = time.monotonic() - self.began
         if passed >= self.next and completed < 1:
             self.next = 2 * passed
@@ -104,7 +104,7 @@ def line(text: str) -> None:
 
 
 def plain(value: Any) -> Any:
-    """What JSON can hold instead of a value that it cannot."""
+    """JSON equivalent of a value that JSON cannot hold."""
     if hasattr(value, "tolist"):
         return value.tolist()
     return list(value) if isinstance(value, tuple | set) else str(value)

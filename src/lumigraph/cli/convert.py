@@ -51,22 +51,22 @@ def convert(
     source
         The file.
     to
-        Whose format, where the ending does not say.
+        Program whose format is written, if the ending does not determine it.
     calibration
         Micro-images of a camera that 'lumigraph board' measured, which 'lumigraph calibrate' finds.
     shape
-        Rows and columns of the raw images, for files that do not say (Raytrix' .xml).
+        Rows and columns of the raw images, for files without them (Raytrix' .xml).
     distance
-        At which COMPOTE's distortion is the same as the camera's, such as '0.4 m'; the plane in focus if left
+        Distance where COMPOTE's distortion equals the camera's, such as '0.4 m'; the plane in focus if left
         out.
     f_number
-        Of the main lens, for COMPOTE.
+        F-number of the main lens, for COMPOTE.
     views
-        Of LFToolbox' light fields, along an axis.
+        Number of views of LFToolbox' light fields, along an axis.
     pixel_pitch
-        Pixel pitch, such as '1.4 um', where LFToolbox' file does not say.
+        Pixel pitch, such as '1.4 um', if LFToolbox' file does not contain it.
     view_pitch
-        From view to view of LFToolbox' file [px]; the micro-images' pitch over the views if left out.
+        Distance between views of LFToolbox' file [px]; the micro-images' pitch over the views if left out.
     output
         File to write.
     """

@@ -48,7 +48,7 @@ def dataset(
 
     Each sample is a raw image by wave optics with the sensor's noise, its picture in focus, the depth of
     each place and what was drawn, in one Zarr store with a data card beside it (.md). The same seed draws
-    the same samples. Kill it at any time: the same line goes on where it was.
+    the same samples. Safe to interrupt: run the same command again to resume.
 
     Example: `lumigraph dataset thesis-plenoptic-1 -n 500 --z "-60 mm:60 mm:20 mm" -o train.zarr`
 
@@ -80,7 +80,7 @@ def dataset(
     cameras
         So many cameras are drawn within --tolerance and the camera file's [tolerances], and take turns.
     seed
-        Of all that is drawn.
+        Seed of all random values.
     accuracy
         Relative rms error of the raw images before noise.
     volume
@@ -145,7 +145,7 @@ def _as_built(
     shapes = sorted({one.operator_grid().shape for one in found})
     if len(shapes) > 1:
         raise FormatError(
-            f"the cameras drawn see pictures of {shapes[0]} to {shapes[-1]} samples, and a data set has one "
+            f"the cameras drawn have objects of {shapes[0]} to {shapes[-1]} samples, but a data set has one "
             "shape. Leave out the tolerances of lenslets.rotation and offset, or make others tighter."
         )
     return found

@@ -39,9 +39,9 @@ def datasheet(
     """Write the data sheet of a plenoptic camera: resolution, directions, depth, light and geometry.
 
     SOURCES are folders of raw images, or camera files, whose charts are simulated by wave optics and measured
-    in the same way; several stand side by side. A folder has a charts.toml that names its pictures, several
-    exposures of each chart (see the page on metric cameras), or white images and scenes told apart by "white"
-    and "dark" in their names.
+    in the same way; several are compared side by side. A folder has a charts.toml that names its pictures,
+    several exposures of each chart (see the page on metric cameras), or white images and scenes,
+    distinguished by "white" and "dark" in their names.
 
     Example: `lumigraph datasheet camera.toml -o sheet.html`
 
@@ -56,15 +56,15 @@ def datasheet(
     camera
         Camera file of the folders' pictures: depths in metres, and limits.
     depths
-        Where simulated charts stand, from the plane in focus, such as --depths '-5 mm' --depths '0 mm'; five
+        Depths of simulated charts, from the plane in focus, such as --depths '-5 mm' --depths '0 mm'; five
         distances over what the camera refocuses if left out.
     exposures
-        Of each simulated chart, white and dark image; 16, or fewer of a large sensor, if left out. The sheet
-        says how far two such sets differ, and how many exposures it takes to 2 %.
+        Exposures of each simulated chart, white and dark image; 16, or fewer for a large sensor. The sheet
+        states the difference of two such sets, and the number of exposures for 2 %.
     seed
-        Of the simulated sensor's noise.
+        Seed of the simulated sensor's noise.
     accuracy
-        Of simulated charts, relative rms, 1e-2 to 1e-5.
+        Accuracy of simulated charts, relative rms, 1e-2 to 1e-5.
     charts
         Folder to write the simulated raw images into, as a laboratory would take them; for one camera file.
     output
@@ -190,7 +190,7 @@ def _table(sheets: "list[Sheet]", section: str) -> list[list[str]]:
 
 
 def _how(sheets: "list[Sheet]", found: "Sequence[Entry | None]") -> str:
-    """How a quantity was measured, camera by camera where that differs."""
+    """Method by which a quantity was measured, camera by camera if methods differ."""
     told = {sheet.name: one.how for sheet, one in zip(sheets, found, strict=True) if one is not None}
     if len(told) == 1 or len(set(told.values())) == 1:
         return next(iter(told.values()))

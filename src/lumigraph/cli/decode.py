@@ -25,7 +25,7 @@ _MOST_SAMPLES = 64
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Sampling:
-    """How the raw image is sampled.
+    """Sampling of the views.
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ class Sampling:
     samples
         Samples of a view per lenslet: those between the lenslets are interpolated.
     interpolation
-        Between pixels, and between lenslets.
+        Interpolation between pixels, and between lenslets.
     hot_pixels
-        Find pixels that shine by themselves without --dark too, leave them out and mark what rests on them.
+        Find hot pixels even without --dark, leave them out and mark the samples that depend on them.
     """
 
     directions: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
@@ -83,7 +83,7 @@ def decode(
     output
         Views (.zarr, .zarr.zip, .h5, _eslf.png), or a folder of pictures.
     devignette
-        Whether to divide by the white image; done where there is one.
+        Divide by the white image; done where there is one.
     """
     from lumigraph import io, preparation, rendering
 

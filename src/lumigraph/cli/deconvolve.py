@@ -149,13 +149,13 @@ def side_by_side(
 
 @dataclass(frozen=True)
 class _Begun:
-    """A raw image that is ready, and what its operator is made of."""
+    """A prepared raw image, and the settings of its operator."""
 
     ready: "PreparedImage"
     asked: "_Asked"
 
     def exposure(self, engine: "Deconvolver") -> Any:
-        """What is known of it."""
+        """Exposure of the raw image."""
         known = engine.known(self.ready, None)
         assert not isinstance(known, tuple)  # one raw image
         _check_gain(self.asked.way, known.gain)
@@ -182,7 +182,7 @@ def _begun(line: "Mapping[str, Any]", frame: "Callable[[], tuple[Path, str | Non
 
 
 def _joins(begun: "_Begun | Any", group: list[Any]) -> bool:
-    """Whether it can be taken with the others."""
+    """True if a raw image can be deconvolved together with the others."""
     others = [one for one in group if isinstance(one, _Begun)]
     if not others or not isinstance(begun, _Begun):
         return True
@@ -190,7 +190,7 @@ def _joins(begun: "_Begun | Any", group: list[Any]) -> bool:
 
 
 def _objects(group: list[Any]) -> list[Any]:
-    """Of those that begun, by one operator."""
+    """Objects of the raw images that were begun, by one operator."""
     mine = [one for one in group if isinstance(one, _Begun)]
     if not mine:
         return group
@@ -236,7 +236,7 @@ def _begin(engine: "Deconvolver") -> None:
 
 @dataclass(frozen=True)
 class _Task:
-    """What the pages of a series share."""
+    """Settings that the pages of a series share."""
 
     engine: "Deconvolver"
     way: Way
@@ -290,7 +290,7 @@ def _check_gain(way: Way, gain: float | None) -> None:
 
 @dataclass(frozen=True)
 class _Asked:
-    """What a deconvolution is made of; equal where the same comes of it."""
+    """Settings of a deconvolution; equal if the same result follows from them."""
 
     described: str
     wanted: Wanted
@@ -306,7 +306,7 @@ class _Asked:
         cls, camera: "Instrument", wanted: Wanted, way: Way, calibration: "Calibration | None",
         progress: Progress, shifts: Shifts | None = None,
     ) -> "_Asked":  # fmt: skip
-        """By the content of the camera's description and of the calibration."""
+        """Settings, compared by the content of the camera's description and of the calibration."""
         from lumigraph.deconvolution.checkpoint import fingerprint
 
         return cls(
@@ -342,7 +342,7 @@ def operator_of(
     camera: "Instrument", planes: tuple[float, ...] | None, samples: int | None,
     calibration: "Calibration | None", progress: Progress = silent, shifts: Shifts | None = None,
 ) -> "Linear":  # fmt: skip
-    """The camera's model of how it sees planes [m], or an object that was moved by shifts [m]."""
+    """Operator of the camera for planes [m], or for an object that was moved by shifts [m]."""
     from lumigraph.instruments.joint import joint_operator_for
 
     if camera.calibration is None and samples is not None:

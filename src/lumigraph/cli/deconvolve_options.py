@@ -1,4 +1,4 @@
-"""What `lumigraph deconvolve` is told of the raw image, of the object, and of how it is done."""
+"""Options of `lumigraph deconvolve`: raw image, object and method."""
 
 import math
 from dataclasses import dataclass, replace
@@ -25,22 +25,22 @@ MOST_DEPTHS = 1000
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Seen:
-    """What is known of the raw image.
+    """Raw image and its corrections.
 
     Parameters
     ----------
     white
         White image: a microscope's lenslets are found on it, and its vignetting is taken into account.
     dark
-        Dark image: what pixels read without light, and which shine by themselves.
+        Dark image: the readings of pixels without light, which also show hot pixels.
     background
         Value that every pixel reads without light, if there is no dark image.
     calibration
         File made by 'lumigraph calibrate', or by the camera's maker, instead of the lenslets found on the
         white image.
     region
-        Rows and columns of the raw image that count, such as '100:501, 80:641'; the rest is neither fitted
-        nor cut off.
+        Rows and columns of the raw image that count, such as '100:501, 80:641'; the rest is ignored in
+        the fit, but not cut off.
     page
         Pages of a stack, counted from 0: one, such as 3, several, such as 3:9 or 3-9, or 'all'.
     """
@@ -88,7 +88,7 @@ class Seen:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Wanted:
-    """Where objects are looked for.
+    """Sampling of the object.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class Wanted:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Way:
-    """How it is done.
+    """Method of the deconvolution.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class Way:
     strength
         Strength of the prior, from 0.001 for bright images to 0.1 for dim ones.
     accelerated
-        Momentum: as likely in a third of the iterations.
+        Accelerated Richardson-Lucy: the same likelihood in about a third of the iterations.
     deviance
         Stop where the deviance per pixel falls to this: to 1 for raw images of 'simulate --noise', whose
         electrons are known; refused where they are not.
@@ -133,7 +133,7 @@ class Way:
         Leave out the low-pass that keeps squares as large as lenslets out of a microscope's volumes. Objects
         that were moved between raw images have none.
     checkpoint
-        File (.npz) from which a killed run goes on.
+        File (.npz) to resume from: after an interruption run the same command again.
     warm
         Begin each page of a series with the result of the one before: where little moves, half of the
         iterations are enough.
@@ -160,7 +160,7 @@ class Way:
         above_zero("--change", self.change)
 
     def method(self, camera: "Instrument", operator: "Linear") -> "RichardsonLucy":
-        """`RichardsonLucy` with what was asked for."""
+        """`RichardsonLucy` with these options."""
         from lumigraph.deconvolution import RichardsonLucy, TotalVariation, Wavelets
         from lumigraph.instruments.smoothing import low_pass_of
 

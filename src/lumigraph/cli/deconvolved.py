@@ -1,4 +1,4 @@
-"""What `lumigraph deconvolve` reports of its result."""
+"""Report of `lumigraph deconvolve` on its result."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def reached(step: "Step", gain: float | None) -> str:
-    """How well it fits: in electrons where they are counted, else how much the last step changed."""
+    """Quality of the fit: deviance if electrons are known, else the change by the last step."""
     if gain is None:
         return f"the last step changed {100 * step.change:.2g} %"
     return f"deviance {step.deviance:.4g} per pixel"

@@ -36,7 +36,7 @@ _OF_RAW = ("dense", "correlation")
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Search:
-    """How depth is measured.
+    """Method of measuring depth.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class _Measured:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Lengths:
-    """What takes a map to metres, if there is no camera file.
+    """Lengths that convert a map to metres, if there is no camera file.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def depth(
         positive farther from the objective;
         else disparities [px per view], positive nearer, refocus factors, or patches [px].
     confidence
-        Where to write the confidence of each place, from 0 to 1.
+        File for the confidence of each place, from 0 to 1.
     lowest
         Confidence below which a point is left out of .ply: 0.5 keeps those with an expected error of less
         than 0.45 px, of cameras 2.0 about 0.55 px.
@@ -272,7 +272,7 @@ def _is_focused(camera: "Instrument | None", calibration: "Calibration") -> bool
 
 
 def _corrected(found: "DepthMap", views: Any, how: tuple[Any, Search], shown: Progress) -> "DepthMap":
-    """Refocus factors without the bias of diffraction, which planes of known depth tell."""
+    """Refocus factors without the bias of diffraction, measured on planes of known depth."""
     from lumigraph import depth as verbs
 
     camera, search = how

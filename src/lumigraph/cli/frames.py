@@ -1,4 +1,4 @@
-"""Frames of a batch: what a verb makes of each, and which there are."""
+"""Frames of a batch, and the output of a verb for each."""
 
 import os
 import tempfile
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Kind:
-    """What a verb gives of a frame.
+    """Output of a verb for one frame.
 
     Parameters
     ----------
     ending
-        Of the file that it writes; empty for one that writes none.
+        Ending of the file that it writes; empty for one that writes none.
     leading
         Words before its input.
     is_table
-        Whether its numbers are wanted.
+        True if its numbers are wanted.
     """
 
     ending: str
@@ -60,11 +60,11 @@ class Frames:
     Parameters
     ----------
     verb
-        Its name.
+        Name of the verb.
     options
-        Its words but for the input, the page and the output.
+        Words of its command but for the input, the page and the output.
     folder
-        That paths among them are relative to.
+        Folder that paths among them are relative to.
     """
 
     verb: str
@@ -72,7 +72,7 @@ class Frames:
     folder: str
 
     def __call__(self, item: dict[str, Any]) -> Any:
-        """What the verb makes of one frame, as if it had been run for it alone."""
+        """Output of the verb for one frame, as if it had been run for it alone."""
         from lumigraph.cluster import Several, Values
 
         if "frames" in item:
@@ -115,7 +115,7 @@ class Frames:
         return SIDE if self.verb == "deconvolve" and "--warm" not in self.options else 1
 
     def several(self, items: Sequence[dict[str, Any]]) -> Iterator[list[Any]]:
-        """What the verb makes of each of some frames, or the error that it ends by; some at a time."""
+        """Outputs of the verb for frames, or the errors that ended it; some are computed at a time."""
         from lumigraph.cli.deconvolve import side_by_side
 
         if self.side_by_side == 1:
@@ -160,7 +160,7 @@ class Frames:
 
 @lru_cache(maxsize=4)
 def _line(frames: Frames) -> dict[str, Any]:
-    """What all frames of a line have in common; reading the line takes as long as an iteration of one."""
+    """Arguments that all frames of a command share; parsing takes as long as an iteration of one."""
     line = frames.bound({"file": "frame", "page": None}, Path())[1]
     line.apply_defaults()
     return dict(line.arguments)
@@ -175,7 +175,7 @@ def _flat(arguments: dict[str, Any]) -> dict[str, Any]:
 
 
 def items_of(paths: Sequence[str], pages: str | None) -> Iterator[dict[str, Any]]:
-    """Of files and patterns, with the pages of a stack that are asked for; None for files as a whole."""
+    """Items of files and patterns, with the chosen pages of a stack; None for files as a whole."""
     for path in paths:
         found = [path] if Path(path).exists() else files.matching(path)
         if not found:
@@ -218,7 +218,7 @@ def _check_unchanged(item: dict[str, Any]) -> None:
 
 
 def _numbers(result: Result) -> dict[str, Any]:
-    """What a row of a table holds: numbers and words, lengths in metres."""
+    """Row of a table: numbers and words, lengths in metres."""
     import json
 
     from lumigraph.cli.console import plain

@@ -40,13 +40,13 @@ def information(
     camera
         Camera file (TOML), or the name of a bundled one.
     depths
-        From the focused plane, such as '-20 um:20 um:5 um', or several, separated by commas.
+        Depths from the focused plane, such as '-20 um:20 um:5 um', or several, separated by commas.
     photons
-        Of the point, that enter the main lens or objective in one exposure.
+        Photons of the point that enter the main lens or objective in one exposure.
     background
         Photons of even light on each pixel, whose number is unknown too.
     places
-        At each depth, over the cell of a lenslet; of one without lenslets before the focused plane, a pixel.
+        Places at each depth, over the cell of a lenslet; without lenslets before the focused plane, a pixel.
     """
     from lumigraph.information import Light, bounds
     from lumigraph.instruments import load_camera
@@ -102,7 +102,7 @@ def _notes(found: "Bounds") -> Iterator[str]:
             f"{np.max(found.errors):.1%}, rms"
         )
     if np.isinf(found.deviations).any():
-        yield "at some places the raw image does not tell all, such as which side of the focus a point is on"
+        yield "at some places the raw image does not determine all, such as the side of the focus"
 
 
 def _figures(found: "Bounds", rows: list[tuple[str, ...]]) -> Iterator[Figure]:

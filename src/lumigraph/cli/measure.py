@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Looked:
-    """What of the pictures is looked at.
+    """Part of the pictures to measure.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Looked:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Dark:
-    """What belongs to a sensor's flats.
+    """Dark pictures and range of a sensor, for its flats.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def _edge(area: "np.ndarray", pitch: float | None) -> Result:
 
 
 def _frequencies(frequencies: "np.ndarray", mtf: "np.ndarray", unit: str) -> list[Quantity]:
-    """Where contrast falls to a half and a tenth, as far as it does."""
+    """Frequencies at which contrast falls to a half and a tenth, as far as it does."""
     from lumigraph.analysis import cutoff
 
     return [

@@ -1,4 +1,4 @@
-"""`lumigraph optimise`: the camera that reaches a goal best, of all that can be made."""
+"""`lumigraph optimise`: the best camera for a goal, of all that can be made."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Aim:
-    """What is made best.
+    """Goal of the optimisation.
 
     Parameters
     ----------
@@ -40,25 +40,25 @@ class Aim:
         A second goal, as --goal: prints and draws the cameras that no other beats in both. Searches for it
         may take as many --evaluations again.
     depths
-        From the focused plane, such as '-5 mm:5 mm:5 mm'.
+        Depths from the focused plane, such as '-5 mm:5 mm:5 mm'.
     photons
-        Of a point, or of a sample of a scene in the mean, that enter the camera as it is given; others get
+        Photons of a point, or of a scene's mean sample, that enter the camera as it is given; others get
         theirs by their aperture.
     background
         Photons of even light on each pixel.
     places
-        Of points at each depth; left out, as many as leave 1 % of the bound unknown, up to 16. More make
+        Points at each depth; left out, as many as leave 1 % of the bound unknown, up to 16. More make
         it smoother over what varies, and take longer.
     scenes
         Pictures, whose contrast and power over frequency scenes have, for the errors of reconstruction;
         values count as light. Left out, 30 % of contrast and power 1/f².
     scene_pitch
-        Of the pictures' pixels in the object, such as '10 um': half the finest period of scenes. Left out,
+        Pixel pitch of the pictures in the object, such as '10 um': half scenes' finest period. Left out,
         half of what the camera as given resolves in focus.
     scene_samples
         Across a scene, which is as wide as so many pixels; the time grows with them.
     held_out
-        Pictures that the search does not see, of the same --scene-pitch: 16 squares of them at most are
+        Pictures held out from the search, of the same --scene-pitch: 16 squares of them at most are
         reconstructed from drawn raw images before the camera as given, the best of the first values and the
         best, as if they were like the --scenes. Warns where the best is not better there.
     """
@@ -85,7 +85,7 @@ class Aim:
         return replace(goal, scenes=self._scenes(goal.ready(given).scenes))
 
     def _scenes(self, usual: "Scenes | None") -> "Scenes | None":
-        """Those that pictures and numbers ask for; None where the goal needs none."""
+        """Scenes for pictures and numbers; None if the goal needs none."""
         from lumigraph.information import Scenes
 
         asked = bool(self.scenes) or self.scene_pitch is not None or self.scene_samples != Aim.scene_samples
@@ -113,7 +113,7 @@ def _pictures(paths: Sequence[Path] | None) -> "list[np.ndarray]":
 @Parameter(name="*")
 @dataclass(frozen=True)
 class How:
-    """How it is looked for.
+    """Search for the optimum.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class How:
     evaluations
         Cameras at most, beyond the first values.
     seed
-        Of --search global, and of the --trials.
+        Seed of --search global, and of the --trials.
     trials
         Raw images that are drawn with noise at each depth, before the camera as given and the best: points
         are fitted in them, or scenes reconstructed, and their errors stand beside what was expected. 0 for
@@ -148,10 +148,10 @@ def optimise(
     output: Output,
     common: Reported = REPORTED,
 ) -> Result:
-    """Look for the camera that reaches a goal best, within ranges and a stock, and write its file.
+    """Search for the best camera for a goal, within ranges and a stock, and write its file.
 
-    All combinations of the first values are computed; then ranges are searched from the best of them. Killed
-    at any time, the same line goes on where it was, to the same camera.
+    All combinations of the first values are computed; then ranges are searched from the best of them. Safe
+    to interrupt: run the same command again to resume; it finds the same camera.
 
     Example: `lumigraph optimise lfm-fourier --vary "fourier_lens=60 mm:110 mm:3" --vary "lenslets.pitch=1 mm, 1.25 mm, 1.5 mm" --depths "-20 um:20 um:10 um" -o best.toml`
 

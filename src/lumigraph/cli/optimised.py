@@ -1,4 +1,4 @@
-"""What `lumigraph optimise` says and reports of its result."""
+"""Report of `lumigraph optimise` on its result."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from lumigraph.optimisation.tried import Tried
 
 NAMES = {"start": "as given", "swept": "the best of the first values"}
-"""Of what stands beside the best."""
+"""Names of the cameras beside the best."""
 
 
 def result(found: "Optimum", given: "Instrument", output: Path) -> Result:
@@ -53,7 +53,7 @@ def _told(goal: "Goal", one: Quantity) -> str:
 
 
 def _reached(found: "Optimum", which: str, one: "Tried") -> str:
-    """What reconstruction reaches of what was expected, in words."""
+    """Error that reconstruction reaches, beside the expected one, in words."""
     words, told = NAMES.get(which, which), found.goal.told
     if one.reason:
         return f"{words}: no raw images were drawn, for {one.reason}"
@@ -72,7 +72,7 @@ def _off(found: "Optimum", one: "Tried") -> str:
 
 
 def _held_out(found: "Optimum") -> Iterator[str]:
-    """Errors of scenes that the search did not see, in words, and how much better the best is."""
+    """Errors of held-out scenes, in words, and the gain of the best camera."""
     best = found.held_out.get("best")
     for which, one in found.held_out.items():
         words = NAMES.get(which, which)
@@ -87,14 +87,14 @@ def _held_out(found: "Optimum") -> Iterator[str]:
 
 
 def _kinds(found: "Optimum") -> tuple[str, str]:
-    """What is done with drawn raw images, and what stands beside it."""
+    """Words for the use of drawn raw images, and for the value beside it."""
     if found.goal.scenes is not None:
         return "reconstructions of drawn scenes", "expected error"
     return f"fits ({found.goal.name}) in drawn raw images", "bound of the same points"
 
 
 def _both(found: "Optimum", k: int) -> str:
-    """Values of both goals of a camera of the front, and what it has of its own."""
+    """Values of both goals of a camera of the front, and its varied values."""
     row, goals = found.front[k], (found.goal, found.against)
     reached = " with ".join(f"{one.name} {one.told(row[one.name])}" for one in goals if one)
     own = ", ".join(f"{key} = {row[key]}" for key in _changed(found) if key in row)
@@ -102,7 +102,7 @@ def _both(found: "Optimum", k: int) -> str:
 
 
 def _changed(found: "Optimum") -> dict[str, Any]:
-    """What the best has of its own, without what follows from it."""
+    """Varied values of the best camera, without the numbers that follow from them."""
     return {key: value for key, value in found.best.items() if key not in found.start}
 
 
@@ -122,7 +122,7 @@ def _notes(found: "Optimum") -> Iterator[str]:
 
 
 def _elsewhere(found: "Optimum") -> str:
-    """What is known of the best anew, or how well."""
+    """Error of the best camera in an independent check, or its uncertainty."""
     best, error, *_ = found.checked["best"]
     if found.goal.scenes is not None:
         scenes = found.goal.scenes
@@ -144,7 +144,7 @@ def _elsewhere(found: "Optimum") -> str:
 
 
 def _between(found: "Optimum") -> str:
-    """Of the best, and of those before it."""
+    """Errors half-way between the depths, for the best camera and for those before it."""
     names = {"best": "", **{which: f"{words} " for which, words in NAMES.items()}}
     some = {words: found.checked[which].between for which, words in names.items() if which in found.checked}
     return ", ".join(f"{words}{found.goal.told(value)}" for words, value in some.items())
@@ -190,7 +190,7 @@ def _trials(found: "Optimum") -> Iterator[Figure]:
 
 
 def _of_held_out(found: "Optimum") -> Iterator[Figure]:
-    """Errors of scenes that the search did not see, and the first of them."""
+    """Figure of the errors of held-out scenes, and the first of them."""
     some = {NAMES.get(which, which): one for which, one in found.held_out.items() if not one.reason}
     if not some:
         return
@@ -263,7 +263,7 @@ def _scaled(goal: "Goal", values: list[float]) -> tuple[list[float], str]:
 
 
 def _search(found: "Optimum") -> Iterator[Figure]:
-    """The best so far over the cameras in turn."""
+    """Figure of the best value so far over the cameras in turn."""
     from lumigraph import plots
     from lumigraph.optimisation.goals import BOUNDS
     from lumigraph.plots.axes import length_unit

@@ -1,4 +1,4 @@
-"""What verbs share: `--json`, `--debug`, and quantities with units."""
+"""Shared options of verbs: `--json`, `--debug`, and quantities with units."""
 
 import math
 import re
@@ -45,12 +45,12 @@ COMMON = Common()
 
 
 def _telling(default: object) -> str | None:
-    """The default as the help shows it, if it is worth showing."""
+    """Text of the default in the help, if it is informative."""
     return None if default is False or default is None else str(default)
 
 
 PARAMETER = Parameter(negative=(), show_default=_telling)
-"""How all verbs' options are read and shown."""
+"""Settings by which all verbs' options are read and shown."""
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
 
 

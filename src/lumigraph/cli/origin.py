@@ -1,4 +1,4 @@
-"""What a raw image comes with: calibration, white and dark image, camera file."""
+"""Options that accompany a raw image: calibration, white and dark image, camera file."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +21,7 @@ Use = Literal["decode", "render"]
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Origin:
-    """What a raw image needs to become views, a picture or a volume.
+    """Corrections and geometry of a raw image, for views, a picture or a volume.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Origin:
 
     @property
     def is_given(self) -> bool:
-        """Whether there is anything that only a raw image needs."""
+        """True if some option is given that only a raw image needs."""
         given = (self.calibration, self.white, self.dark, self.page)
         return any(one is not None for one in given)
 
@@ -110,11 +110,11 @@ class Origin:
         Parameters
         ----------
         raw
-            As it was read.
+            Raw image as it was read.
         use
-            What the camera's raw images must be for; None for anything.
+            Verb that the camera's raw images must be suited to; None for any.
         devignette
-            Whether to divide by the white image; None for yes where there is one.
+            True to divide by the white image; None for yes where there is one.
         """
         from lumigraph.preparation import Given
 
@@ -131,7 +131,7 @@ class Origin:
 
 
 def notes_of(ready: "PreparedImage", camera: str | None = None) -> tuple[str, ...]:
-    """What was done to a raw image, and what its views do not know; `camera` as it was given."""
+    """Notes on a prepared raw image, and on lengths missing for its views; `camera` as it was given."""
     known = ready.calibration
     if known is None or (known.separation and known.lenslet_distance):
         return ready.notes

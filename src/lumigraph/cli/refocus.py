@@ -32,7 +32,7 @@ MOST_SHOWN = 24
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Focus:
-    """Where to focus: α' = F/F', below 1 nearer than the focused plane was, 1 as it was, above 1 farther.
+    """Focus: α' = F/F', below 1 nearer than the focused plane, 1 as recorded, above 1 farther.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Focus:
 
     @property
     def count(self) -> int:
-        """Pictures that are asked for."""
+        """Number of requested pictures."""
         several = range_of("--alphas", self.alphas) if self.alphas else []
         return len(self.alpha or []) + len(several) + len(self.depth or [])
 
@@ -83,7 +83,7 @@ def _check_alpha(alpha: float) -> None:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Quality:
-    """How pictures are made.
+    """Method of making pictures.
 
     Parameters
     ----------

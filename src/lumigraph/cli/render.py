@@ -68,12 +68,12 @@ class Tiles:
 
     @property
     def is_given(self) -> bool:
-        """Whether there is anything that only a raw image needs."""
+        """True if some option is given that only a raw image needs."""
         return self != Tiles()
 
     @property
     def is_auto(self) -> bool:
-        """Whether the patches are to be found in the raw image."""
+        """True if the patches are to be found in the raw image."""
         return self.depth is not None and self.depth.strip().lower() == "auto"
 
     def check(self, camera: str | None) -> None:
@@ -199,7 +199,7 @@ def render(
     output
         Picture (.png, .tiff, .zarr); several planes or a path: a stack (.tiff) or a film (.gif, .mp4).
     depth_map
-        Where to write the map of patches or refocus factors that was found (.tiff, .pfm, .zarr).
+        File for the map of patches or refocus factors that was found (.tiff, .pfm, .zarr).
     """
     from lumigraph import io
     from lumigraph.core.lightfield import LightField
@@ -236,7 +236,7 @@ def render(
 
 @dataclass(frozen=True)
 class _Made:
-    """What was rendered: pictures, what is reported of them, and the map that was found or None."""
+    """Rendered pictures, their report, and the depth map that was found or None."""
 
     pictures: list[Any]
     text: str

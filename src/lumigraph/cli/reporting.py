@@ -60,7 +60,7 @@ def telling(verb: Verb) -> Verb:
     Raises
     ------
     LumigraphError
-        The result's failure, after it is told.
+        The result's failure, after it is printed.
     """
 
     @wraps(verb)
@@ -75,7 +75,7 @@ def telling(verb: Verb) -> Verb:
 
 
 def tell(common: Common, result: Result) -> None:
-    """Print a result as text or as JSON, and write its report where one is asked for."""
+    """Print a result as text or as JSON, and write its report if one is requested."""
     text, values = result.text(WARNED.get([])), result.values()
     if isinstance(common, Reported) and common.report is not None:
         page(result).write(common.report)

@@ -27,9 +27,9 @@ def reproduce(
     output: Output = Path("reproduce"),
     common: Common = COMMON,
 ) -> Result:
-    """Compute the tables and figures of the thesis again, beside what is printed and what is right.
+    """Recompute the tables and figures of the thesis, beside the printed and the correct values.
 
-    Writes report.html and results.json. What an interrupted run has finished is not computed again.
+    Writes report.html and results.json. Finished parts of an interrupted run are not computed again.
     With --json prints a list of rows. The exit code is 1 if any row is out of tolerance.
 
     Example: `lumigraph reproduce 5.4 --quick`
@@ -104,7 +104,7 @@ def _table(result: "Computed") -> str:
 
 
 def _failure(results: "list[Computed]", output: Path) -> str:
-    """Why the exit code is 1, or nothing."""
+    """Reason for the exit code 1, or an empty text."""
     failed = [result for result in results if result.failed]
     if not failed:
         return ""

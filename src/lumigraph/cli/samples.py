@@ -30,7 +30,7 @@ def samples(
     action
         make: write the files.
     names
-        Which; all of them if left out.
+        Samples to write; all of them if left out.
     output
         Folder for the files; made if it does not exist.
     size

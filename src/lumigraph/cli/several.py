@@ -1,4 +1,4 @@
-"""What `lumigraph deconvolve` is told of several raw images of one object."""
+"""Options of `lumigraph deconvolve` for several raw images of one object."""
 
 import re
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from lumigraph.instruments import FoundShifts, Instrument
 
 MOST_STEPS = 30
-"""Of a scan, along each axis."""
+"""Most steps of a scan, along each axis."""
 
 Shifts = tuple[tuple[float, float], ...]
 
@@ -25,19 +25,19 @@ Shifts = tuple[tuple[float, float], ...]
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Several:
-    """How raw images of one object differ.
+    """Differences between raw images of one object.
 
     Parameters
     ----------
     shifts
-        By which the object was moved: '3x3', thirds of a lenslet in the object, row after row from the least
+        Displacements of the object: '3x3', thirds of a lenslet in the object, row after row from the least
         y and x; or a pair for each raw image, such as '0 um, 0 um; 33 um, 0 um', y first.
     find_shifts
         Find the shifts from the raw images, whose noise is known, near those of --shifts: for an object with
         texture, flat and in focus before a camera 1.0, of any depth before a microscope 1.0, moved by a stage
         that is off by some tenths of a lenslet.
     light
-        Of each raw image over the first one's, such as '1, 1, 4': exposure times. Left out, as the raw images
+        Relative exposure of each raw image, such as '1, 1, 4': exposure times. Left out, as the raw images
         of 'simulate' record it, else the same.
     """
 
@@ -95,7 +95,7 @@ class Several:
         return tuple((float(y), float(x)) for y, x in found.shifts.tolist()), found
 
     def lights(self) -> tuple[float, ...]:
-        """Of each raw image."""
+        """Relative light of each raw image."""
         words = (self.light or "").split(",")
         try:
             found = tuple(float(word) for word in words)
@@ -130,7 +130,7 @@ def _check_count(option: str, found: int | None, count: int) -> None:
 
 
 def _steps(text: str) -> int | None:
-    """Of a scan written as '3x3'; None of anything else."""
+    """Number of steps of a scan written as '3x3'; None for any other text."""
     found = re.fullmatch(r"\s*(\d+)\s*[x×]\s*(\d+)\s*", text)
     if found is None:
         return None

@@ -43,7 +43,7 @@ _COUNTS = {"snapshots": 100, "tilted": 64}
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Light:
-    """How the light of the scene interferes.
+    """Coherence and spectrum of the scene's light.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Light:
     na
         Numerical aperture of the tilted waves, all directions if left out; or of the lamp of partial.
     wavelength
-        Wavelength instead of the camera's own, such as '550 nm'. May be repeated: the sensor sees the sum;
+        Wavelength instead of the camera's own, such as '550 nm'. May be repeated: the raw image is the sum;
         with --colours three are red, green and blue.
     colours
         rgb: a colour raw image; or a Bayer pattern, such as RGGB. The scene's pictures keep their colours.
@@ -122,7 +122,7 @@ class Light:
 
     @contextmanager
     def unasked(self) -> "Iterator[None]":
-        """Without --accuracy the result states what parabolic lenses miss: nobody asked for less."""
+        """True without --accuracy: the result then only states the error of parabolic lenses."""
         with warnings.catch_warnings():
             if self.accuracy is None:
                 warnings.simplefilter("ignore", ParaxialWarning)
@@ -147,7 +147,7 @@ class Light:
         if self.na is None:
             raise FormatError("--coherence partial needs --na, the numerical aperture of the lamp.")
         if not isinstance(camera, WithMainLens):
-            raise FormatError("--coherence partial is for cameras: a microscope sees fluorescence.")
+            raise FormatError("--coherence partial is for cameras: microscopes image fluorescence.")
         lamp = ExtendedSource.disc(self.na, -camera.object_distance)
         return simulation.PartiallyCoherent(lamp, 1e-3 if self.accuracy is None else self.accuracy)
 
@@ -155,7 +155,7 @@ class Light:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Stage:
-    """What stands in front of the camera.
+    """Scene in front of the camera.
 
     Parameters
     ----------
@@ -171,10 +171,10 @@ class Stage:
     planes
         Opaque slices that --depth-map is sorted into, 1 to 64; 8 if left out.
     medium
-        What refracts before the scene, of light-field microscopes: a volume of refractive indices (OME-TIFF,
+        Refracting volume before the scene, for light-field microscopes: refractive indices (OME-TIFF,
         .zarr, .h5), as --medium-index says. Each point and each lit sample then has an image of its own.
     medium_depth
-        By how much the volume's depths are moved, such as '-20 um' (nearer to the objective).
+        Displacement of the volume's depths, such as '-20 um' (nearer to the objective).
     medium_index
         difference: indices less that of the objective's medium; absolute: indices, such as 1.37.
     point
@@ -229,7 +229,7 @@ class Stage:
         return sum(parts, Scene())
 
     def refracting(self, camera: "Instrument") -> "Medium | None":
-        """What the scene is seen through."""
+        """Medium through which the scene is imaged."""
         if self.medium is None:
             return None
         from dataclasses import replace
@@ -359,7 +359,7 @@ def simulate(
     )  # fmt: skip
     table = described.describe()
     return Result(
-        "Simulate", f"What the sensor of a {table.title} sees.", raw, tuple(lines), values,
+        "Simulate", f"Raw image of a {table.title}.", raw, tuple(lines), values,
         lambda: _figures(raw, described), tuple(table.warnings), (output,),
     )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""How a batch stands, as a page beside its ledger that a browser reads again by itself."""
+"""Status page of a batch, beside its ledger; a browser reloads it by itself."""
 
 import time
 from pathlib import Path
@@ -26,7 +26,7 @@ class Standing:
     Parameters
     ----------
     output
-        Of the batch.
+        Output of the batch.
     shown
         Progress that it passes on.
     """

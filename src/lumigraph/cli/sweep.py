@@ -39,11 +39,11 @@ def sweep(
     workers: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None,
     common: Reported = REPORTED,
 ) -> Result:
-    """Vary a camera's values and write what follows from each combination into a table.
+    """Vary a camera's values and write the quantities of each combination into a table.
 
-    What follows are the closed forms that 'lumigraph design' prints, and of plenoptic cameras what is measured
-    on a simulated picture of a chessboard. A combination that no camera can have is a row with the reason.
-    Killed at any time, the same line goes on where it was.
+    Quantities are the closed forms that 'lumigraph design' prints and, for plenoptic cameras, measures on a
+    simulated picture of a chessboard. An impossible combination becomes a row with the reason.
+    Safe to interrupt: run the same command again to resume.
 
     Example: `lumigraph sweep thesis-plenoptic-2-m050 --vary "lenslets.focal_length=4 mm:6 mm:9" --vary "lenslets.magnification=0.3,0.5" --measure "views per axis, lateral resolution" -o table.csv`
 
@@ -97,14 +97,14 @@ def sweep(
 
 @dataclass(frozen=True)
 class Designs:
-    """What follows from a camera with other values.
+    """Quantities of a camera with changed values.
 
     Parameters
     ----------
     camera
         File, or a name of the catalogue.
     names
-        Of the quantities.
+        Names of the quantities.
     """
 
     camera: str
@@ -129,7 +129,7 @@ class Designs:
         )
 
     def _simulated(self, camera: "Instrument") -> "Iterable[Quantity]":
-        """What is measured on a simulated picture."""
+        """Quantities measured on a simulated picture."""
         from lumigraph import metric
         from lumigraph.core.cache import SHARED
         from lumigraph.metric.charts import check_camera
@@ -159,7 +159,7 @@ def axes_of(varied: Mapping[str, list[Any]]) -> "Axes":
 
 
 def _names(measure: str | None, known: Sequence[str]) -> list[str]:
-    """The quantities that are asked for."""
+    """Requested quantities."""
     if measure is None:
         return list(known)
     from lumigraph.metric import is_measure

@@ -1,4 +1,4 @@
-"""`lumigraph tolerance`: what errors of making do to a camera, and which tolerance to pay for."""
+"""`lumigraph tolerance`: effects of manufacturing tolerances on a camera."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,7 +26,7 @@ Tolerances = Annotated[
 ALONE = Hands()
 
 _POINTS = 200
-"""Of a drawn curve at most."""
+"""Most points of a drawn curve."""
 
 _SHOWN = 3
 """Tolerances that a line names."""
@@ -44,11 +44,11 @@ def tolerance(
     hands: Hands = ALONE,
     common: Reported = REPORTED,
 ) -> Result:
-    """Draw cameras with errors of making, and say which tolerance to pay for.
+    """Draw cameras with manufacturing errors, and rank the tolerances by their effect.
 
-    A camera with errors is as it was built: all else stays where the camera file puts it, and its plane of
-    focus moves. Each measure gets its mean and deviation over the cameras drawn, and the share of each
-    tolerance by first-order sensitivities. Killed at any time, the same line goes on where it was.
+    Each drawn camera is built with errors and not readjusted, so that its plane of focus moves. Each measure
+    gets its mean and deviation over the cameras drawn, and the share of each tolerance by first-order
+    sensitivities. Safe to interrupt: run the same command again to resume.
 
     Example: `lumigraph tolerance thesis-plenoptic-2-m050 -t "separation=±0.05 mm" -t "lenslets.focal_length=±1 %" -t "lenslets.pitch=±0.1 um uniform" -o draws.csv`
 
@@ -64,7 +64,7 @@ def tolerance(
         "lenslets.focal_length=±1 % uniform"; +- will do. Normal errors keep to it in 95 % of all cameras,
         uniform ones in all. Lenslets that differ from each other: "lenslets.each.focal_length=±1 %",
         "lenslets.each.decentre=±2 um", "lenslets.each.tilt=±1 mrad" (with their index in the camera file),
-        "lenslets.each.form=±20 nm" (rms path), "lenslets.each.missing=0.2 %". What leans: "array_tilt_y=±1 mrad",
+        "lenslets.each.form=±20 nm" (rms path), "lenslets.each.missing=0.2 %". Tilts and bow: "array_tilt_y=±1 mrad",
         array_tilt_x, array_bow (a length, at the corners), sensor_tilt_y, sensor_tilt_x. May be repeated.
     draws
         Cameras drawn.
@@ -74,7 +74,7 @@ def tolerance(
         micro-image fill, corner shift y, corner shift x, corner focus shift, corner depth error, lenslet focus shift, light of a point, lenslet Strehl ratio,
         and the simulated ones of 'lumigraph sweep'.
     seed
-        Of all that is drawn.
+        Seed of all random values.
     output
         Table of the cameras (.csv, or .parquet with pyarrow); that of the tolerances is written beside it,
         as NAME-tolerances.
@@ -123,7 +123,7 @@ def given_tolerances(texts: list[str]) -> dict[str, str]:
 
 
 def _partly(found: Any, output: Path) -> Result:
-    told = f"{found.stand} are done; the last part tells what follows from them"
+    told = f"{found.stand} are done; the last part reports the results"
     return Result("Tolerances", "A part of the cameras.", None, (told,), written=(output,))
 
 
@@ -135,7 +135,7 @@ def _result(study: "Study", output: Path) -> Result:
     counts = (Quantity("cameras", study.draws), Quantity("impossible", len(study.failures)))
     words = [f"{study.draws} cameras drawn with {len(study.names)} tolerances"]
     words += [_line(one, study.names) for one in study.outcomes]
-    about = "What errors of making do to a camera, and which tolerance to pay for."
+    about = "Effects of manufacturing tolerances on a camera, ranked."
     return Result(
         "Tolerances", about, study, tuple(words), (*counts, *study.quantities()),
         lambda: _figures(study), tuple(study.notes()), (output, beside), {"tolerances": study.rows()},
@@ -166,7 +166,7 @@ def _text(one: "Outcome", value: float) -> str:
 
 
 def _figures(study: "Study") -> Iterator[Figure]:
-    """Of each measure, which tolerance costs what, and how many cameras are below a value."""
+    """Figures of each measure: cost of each tolerance, and the share of cameras below a value."""
     from lumigraph import plots
 
     for one in study.outcomes:

@@ -34,10 +34,10 @@ def twin(
     output: Output | None = None,
     common: Reported = REPORTED,
 ) -> Result:
-    """Compare a bench with its camera file by white images, and say what to turn on the bench.
+    """Compare a bench with its camera file by white images, and print the adjustments to make.
 
     WHITES are white images of the bench as it stands, which are averaged. The array's height, tilt, shift
-    and turn and the stop's diameter are told, with 95 % intervals; what is not sure is not told.
+    and rotation and the diameter of the stop are reported with 95 % intervals, or as undetermined.
 
     Example: `lumigraph twin white.tiff --camera camera.toml`
 
@@ -48,11 +48,11 @@ def twin(
     whites
         White images of one state of the bench.
     camera
-        Camera file, or a name of the catalogue: what the bench is meant to be.
+        Camera file, or a name of the catalogue: the intended bench.
     dark
         Picture without light.
     pitch_error
-        How well the lenslets' pitch over the pixels' is known, one standard deviation over it; 3e-4 if left
+        Standard deviation of the lenslets' pitch over the pixels', as a part of it; 3e-4 if left
         out. Height and stop are known no better than that allows.
     watch
         Folder: every new picture in it is compared, until Ctrl-C; the last result is the command's.

@@ -18,7 +18,7 @@ from lumigraph.errors import FormatError
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Shown(Origin):
-    """What a raw image needs to become views or pictures.
+    """Corrections and geometry of a raw image, for views or pictures.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Shown(Origin):
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Page:
-    """How the page is shown.
+    """Display of the page.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Page:
 
     @property
     def is_file(self) -> bool:
-        """Whether the page is written into one file."""
+        """True if the page is written into one file."""
         return self.export is not None and self.export.suffix.lower() in (".html", ".htm")
 
     def check(self) -> None:
@@ -98,7 +98,7 @@ def view(
 ) -> Result | None:
     """Look at a file in the browser: refocus by a click, move the viewpoint, see raw pixels, depth, volumes.
 
-    Prints the page's address and ends with Ctrl-C. Only this computer's browser is answered.
+    Prints the page's address and ends with Ctrl-C. Only browsers on this computer can reach it.
 
     Example: `lumigraph view views.zarr`
 

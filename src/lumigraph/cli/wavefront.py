@@ -37,8 +37,8 @@ def wavefront(
 ) -> Result:
     """Find the wavefront at a camera's main lens, from one raw image of a star or of a scene.
 
-    Of a star, or any point of light, Zernike terms are fitted to the pixels through the camera's wave optics.
-    Of a flat scene with texture they follow from the shifts of views, as rays see it: for a camera of kind
+    For a star, any point of light, Zernike terms are fitted to the pixels through the camera's wave optics.
+    For a flat scene with texture they follow from the shifts of views, by rays: for a camera of kind
     "plenoptic" or a microscope of configuration "1.0", and less exactly. Terms have standard deviations.
 
     Example: `lumigraph wavefront star.tiff --camera telescope.toml --dark dark.tiff --report wavefront.html`
@@ -52,11 +52,11 @@ def wavefront(
     camera
         Camera file (TOML), or the name of a bundled one.
     object
-        What the raw image shows: star, one point of light; scene, something flat in the focused plane.
+        Content of the raw image: star, one point of light; scene, something flat in the focused plane.
     terms
-        Noll indices of the Zernike terms that are looked for, such as 4-21 or 4,5,6.
+        Noll indices of the Zernike terms to find, such as 4-21 or 4,5,6.
     place
-        Of the star from the axis and the focused plane, y, x and z, such as '0 um, 0 um, 2 mm'; the middle of
+        Position of the star, y, x and z from the focused plane, such as '0 um, 0 um, 2 mm'; the middle of
         the picture if left out. y and x need be known to within half a lenslet.
     output
         Camera file with these aberrations (.toml).
@@ -93,7 +93,7 @@ def _check(seen_as: str, place: str | None, seen: Seen) -> None:
 
 
 def _place(text: str | None) -> tuple[float, float, float]:
-    """Of the star [m].
+    """Position of the star [m].
 
     >>> _place("1 um, -2 um, 3 mm")
     (1e-06, -2e-06, 0.003)

@@ -1,4 +1,4 @@
-"""What the rest of a job will need: `Estimate`."""
+"""Estimate of the time, memory and disk space that the rest of a job needs: `Estimate`."""
 
 import heapq
 import math
@@ -14,20 +14,20 @@ from lumigraph.errors import SamplingError
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What the rest of a job will need, from the frames that are done.
+    """Needs of the rest of a job, from the frames that are done.
 
     Parameters
     ----------
     frames
         Still to do.
     seconds
-        Of all workers together, side by side [s].
+        Time of all workers together, side by side [s].
     memory
-        Of one worker [bytes].
+        Memory of one worker [bytes].
     size
-        On the disk [bytes].
+        Size on the disk [bytes].
     noun
-        What an item is.
+        Name of an item.
     busy
         Processor time of all workers together [s].
     """
@@ -49,18 +49,18 @@ class Estimate:
         processors: float = math.inf,
         starting: float = 0.0,
     ) -> "Estimate":
-        """From entries of frames like those to come: the first one of each worker made what it keeps.
+        """Estimate from entries of similar frames; the first one of each worker includes its set-up.
 
         Parameters
         ----------
         entries
-            In the order in which they ended.
+            Entries in the order in which they ended.
         frames
             Still to do.
         workers
-            Of which those with an entry are ready; the others make what they keep first.
+            Number of workers. Those with an entry are ready; the others make what they keep first.
         processors
-            That all workers share: a frame alone may use several. Infinite where they are not known.
+            Processors that all workers share: a frame alone may use several. Infinite if unknown.
         starting
             Time until a worker begins [s].
         """

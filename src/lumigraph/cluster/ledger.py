@@ -1,6 +1,6 @@
-"""What of a job is done: a folder beside its output, which any number of processes and machines write.
+"""Record of a job's finished frames: a folder beside its output, written by any number of processes.
 
-An entry is a file of its own, written in one step after the frame's shards, and names their checksums: it
+Each entry is a separate file, written in one step after the frame's shards, and names their checksums: it
 counts while the shards are as it says. A worker claims a frame by a lock on one byte of a file; the system
 gives it back when the worker ends, however it ends.
 """
@@ -40,18 +40,18 @@ _MEMORY = 1 << 26
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What is known of a frame that is done.
+    """Record of a frame that is done.
 
     Parameters
     ----------
     number
-        Of the frame.
+        Number of the frame.
     seconds
-        That it took [s].
+        Time that it took [s].
     memory
         Most that its worker had held until then [bytes].
     size
-        Of what it wrote [bytes].
+        Size of its files [bytes].
     where
         Machine and process.
     files
@@ -82,14 +82,14 @@ class Ledger:
     Parameters
     ----------
     folder
-        That holds them.
+        Folder of the ledger's files.
     """
 
     folder: Path
 
     @classmethod
     def beside(cls, output: Path) -> "Ledger":
-        """That of an output."""
+        """Ledger of an output."""
         return cls(output.with_name(output.name + ENDING))
 
     def open(self, what: Mapping[str, Any], items: Sequence[Any]) -> None:
@@ -115,7 +115,7 @@ class Ledger:
                 )
 
     def job(self) -> dict[str, Any]:
-        """What the job is.
+        """Description of the job.
 
         Raises
         ------
@@ -135,12 +135,12 @@ class Ledger:
 
     @property
     def noun(self) -> str:
-        """What an item is: a frame, or as many in a row as the job says."""
+        """Name of an item: a frame, or a run of as many as the job says."""
         run = self.job()["what"].get("run")
         return f"run of {run} frames" if run else "frame"
 
     def entry(self, number: int) -> Entry | None:
-        """That of a frame; None where there is none, or a torn one."""
+        """Entry of a frame; None if there is none, or it is incomplete."""
         with suppress(OSError, ValueError, TypeError, AttributeError):
             found = json.loads(self._path(_DONE, number).read_bytes())
             found["files"] = {name: tuple(pair) for name, pair in found["files"].items()}
@@ -228,7 +228,7 @@ class Ledger:
 
 _HELD: set[tuple[str, int]] = set()
 _GUARD = threading.Lock()
-"""Locks of files are the process' own: threads of one are told apart here."""
+"""Locks of files are the process' own: threads of one are distinguished here."""
 
 
 @contextmanager
@@ -301,7 +301,7 @@ def _difference(begun: Any, asked: Any, name: str) -> str:
 
 
 def _of_file(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
-    """How a file differs that has the same name."""
+    """Difference between two files of the same name, in words."""
     name = Path(str(begun["file"])).name
     if begun.get("size") != asked.get("size"):
         return f"{name} had {begun.get('size')} bytes, now {asked.get('size')}"

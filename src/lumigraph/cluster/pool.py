@@ -24,7 +24,7 @@ class Pool:
     Parameters
     ----------
     task
-        That they share.
+        Task that the workers share.
     count
         Workers.
     """
@@ -48,7 +48,7 @@ class Pool:
         self._workers.clear()
 
     def each(self, numbers: Iterable[int]) -> Iterator[Outcome]:
-        """How each frame ended, in the order in which they do."""
+        """Outcomes of frames, in the order in which they end."""
         waiting = deque(numbers)
         while waiting or self._busy():
             while waiting and (pipe := self._idle()) is not None:

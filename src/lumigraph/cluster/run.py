@@ -22,10 +22,10 @@ _TRIED, _TRIAL, _PART = 16, 5.0, 4
 at most, if more than one; and one of so many frames at most."""
 
 _TOLD = 16
-"""Of so many frames that are checked, one is told of."""
+"""Frames that are checked for each call of the progress callback."""
 
 _ROUNDS, _PATIENCE = 600, 1.0
-"""How often, and after how many seconds, frames are asked for again that somebody else works on."""
+"""How often, and after how many seconds, frames that another worker claims are tried again."""
 
 
 class Group(Protocol):
@@ -33,20 +33,20 @@ class Group(Protocol):
 
     @property
     def count(self) -> int:
-        """Of them."""
+        """Number of workers."""
         ...
 
     def each(self, numbers: Iterable[int]) -> Iterator[Outcome]:
-        """How each frame ended, in the order in which they do."""
+        """Outcomes of frames, in the order in which they end."""
         ...
 
 
 class Cluster(Protocol):
-    """Where workers are found."""
+    """Protocol of a source of workers: this machine, or a scheduler."""
 
     @property
     def is_here(self) -> bool:
-        """Whether they share this machine's memory."""
+        """True if workers share this machine's memory."""
         ...
 
     def group(self, task: Task) -> AbstractContextManager[Group]:
@@ -61,7 +61,7 @@ class Local:
     Parameters
     ----------
     count
-        Of them.
+        Number of workers.
     """
 
     count: int
@@ -74,26 +74,26 @@ class Local:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """How a job stands.
+    """State of a job.
 
     Parameters
     ----------
     count
         Frames in all.
     entries
-        Of those that are done, by number.
+        Entries of the frames done, by number.
     failures
         Why frames failed, by number.
     seconds
-        That this start took [s].
+        Time since this start [s].
     pace
         Frames a second, of late; 0 where it is not known.
     link
-        Of the scheduler's own page, while it is in use.
+        Link to the scheduler's own page, while it is in use.
     page
         File that shows how it stands, where there is one.
     noun
-        What an item is.
+        Name of an item.
     """
 
     count: int
@@ -107,7 +107,7 @@ class Report:
 
     @property
     def stand(self) -> str:
-        """How many are done, in words."""
+        """Number of frames done, in words."""
         return f"{self.done} of {self.count} {many(self.noun, self.count)}"
 
     @property
@@ -117,7 +117,7 @@ class Report:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all frames are done."""
+        """True if all frames are done."""
         return self.done == self.count
 
 
@@ -145,15 +145,15 @@ def batch(
         It gives a picture, several, views, a volume, a depth map or arrays by name, of one shape for all
         items, which go into shards of a Zarr store; `Several` of them; or `Values`, which stay in the ledger.
     items
-        What JSON can hold: paths, numbers, mappings of them.
+        Items that JSON can hold: paths, numbers, mappings of them.
     output
         A Zarr store, which others can open while it grows.
     what
-        What the work is, as JSON values: a start with another one is refused.
+        Description of the work, as JSON values: a start with another one is refused.
     workers
         Processes on this machine; or a `Dask` cluster.
     part
-        Which of how many equal parts of the items to do, counted from 1, as the jobs of a queue share them.
+        Part of the items to do, of how many equal ones, counted from 1, as the jobs of a queue share them.
     progress
         Called with the fraction that is done.
     estimated
@@ -209,7 +209,7 @@ def rows(output: str | os.PathLike[str]) -> Iterator[list[dict[str, Any]]]:
 
 
 def status(output: str | os.PathLike[str]) -> Report:
-    """How a job stands, by its output or its ledger, while it runs or afterwards.
+    """State of a job, by its output or its ledger, while it runs or afterwards.
 
     Raises
     ------
@@ -228,7 +228,7 @@ def status(output: str | os.PathLike[str]) -> Report:
 
 
 def page(output: str | os.PathLike[str]) -> Path:
-    """Where the page lies that shows how a job stands, by its output or its ledger."""
+    """Path of the page that shows the state of a job, by its output or its ledger."""
     path = Path(output)
     return (path if (path / "job.json").exists() else Ledger.beside(path).folder) / PAGE
 
@@ -237,7 +237,7 @@ def _begin(
     task: Task, who: tuple[Cluster, Group], left: list[int], progress: Progress,
     estimated: Callable[[Estimate], None] | None,
 ) -> list[int]:  # fmt: skip
-    """Do frames that show what the others will need, tell it, and give the others.
+    """Do some frames, report the estimated needs of the rest, and return the rest.
 
     The first one makes what they share; after it, some from all over the job by all workers side by side.
 
@@ -284,7 +284,7 @@ def _quickest(known: list[Entry]) -> float:
 
 
 def _entries(task: Task, numbers: list[int]) -> list[Entry]:
-    """Of those frames that did not fail."""
+    """Entries of the frames that did not fail."""
     return [entry for number in numbers if (entry := task.ledger.entry(number)) is not None]
 
 
@@ -303,7 +303,7 @@ def _need(
 
 
 def _do(task: Task, group: Group, numbers: list[int], done: int, total: int, progress: Progress) -> list[int]:
-    """Do some frames; those that somebody else works on are asked for until they are done.
+    """Do some frames; those claimed by another worker are tried until they are done.
 
     Their numbers are given in the order in which they ended.
 
@@ -350,7 +350,7 @@ def _left(task: Task, first: int, last: int, progress: Progress) -> Iterator[int
 
 
 def _kept(task: Task, number: int) -> bool:
-    """Whether a frame is done and its shards are whole; what was noted of one that is not is forgotten."""
+    """True if a frame is done and its shards are intact; the record of one that is not is removed."""
     if task.is_done(number, content=True):
         return True
     task.ledger.forget(number)

@@ -22,12 +22,12 @@ _ONE = Lock()
 
 @dataclass(frozen=True, slots=True)
 class Dask:
-    """A running dask cluster, whose workers have lumigraph and see the same files.
+    """A running dask cluster, whose workers have lumigraph and access to the same files.
 
     Parameters
     ----------
     address
-        Of its scheduler, such as "tcp://10.0.0.1:8786".
+        Address of its scheduler, such as "tcp://10.0.0.1:8786".
     """
 
     address: str
@@ -78,7 +78,7 @@ class _Group:
         return max(len(self.client.scheduler_info(n_workers=-1)["workers"]), 1)
 
     def each(self, numbers: Iterable[int]) -> Iterator[Outcome]:
-        """How each frame ended, in the order in which they do.
+        """Outcomes of frames, in the order in which they end.
 
         Raises
         ------
@@ -118,7 +118,7 @@ _WORK: dict[str, Any] = {}
 
 
 def _do(task: Task, numbers: list[int], key: str) -> list[Outcome]:
-    """What a worker does; the work is the process' own, as each frame brings a copy that keeps nothing."""
+    """Outcomes of frames on a worker; the work is cached by process, as each frame brings a fresh copy."""
     with _ONE:
         if key not in _WORK:
             _WORK.clear()

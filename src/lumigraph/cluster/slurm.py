@@ -14,20 +14,20 @@ from lumigraph.errors import LumigraphError
 def script(
     command: Sequence[str], output: Path, jobs: int, options: Sequence[str] = (), folder: Path | None = None
 ) -> str:
-    """What `sbatch` is given.
+    """Batch script for `sbatch`.
 
     Parameters
     ----------
     command
-        That does a part, which its last word names: ``K/jobs`` is put behind it.
+        Command that does a part, which its last word names: ``K/jobs`` is put behind it.
     output
-        Of the batch; what jobs print goes beside its ledger.
+        Output of the batch; what jobs print goes beside its ledger.
     jobs
-        Of the array.
+        Number of jobs in the array.
     options
         More of sbatch's, such as ``--time=2:00:00``.
     folder
-        Where the command runs; the present one if left out.
+        Folder in which the command runs; the present one if left out.
     """
     place = Ledger.beside(output.absolute()).folder
     heads = [

@@ -1,4 +1,4 @@
-"""What a worker does for one frame, wherever it runs: claim it, compute it, write it, note it."""
+"""Work on one frame, wherever it runs: claim it, compute it, write it, record it."""
 
 import errno
 import os
@@ -26,7 +26,7 @@ Outcome = tuple[int, str]
 """Number of a frame and how it ended."""
 
 DONE, FAILED, BUSY, FULL = "done", "failed", "busy", "full"
-"""How a frame ended: noted as done, noted as failed, claimed by somebody else."""
+"""Outcomes of a frame: noted as done, noted as failed, claimed by somebody else."""
 
 _LONGEST = 400
 """Characters of an error that are kept."""
@@ -64,11 +64,11 @@ class SideBySide(Protocol):
 
     @property
     def side_by_side(self) -> int:
-        """How many it wants at a time, at most."""
+        """Number of items to compute at a time, at most."""
         ...
 
     def several(self, items: Sequence[Any]) -> Iterator[Sequence[Any]]:
-        """What is wanted of each item, or the exception that it ended by, in order; some of them at a time.
+        """Results of each item in order, or the exception that ended it; some are computed at a time.
 
         Which items there are does not change a bit of what it gives of one.
         """
@@ -77,14 +77,14 @@ class SideBySide(Protocol):
 
 @dataclass(frozen=True)
 class Task:
-    """A job as a worker sees it; it is sent to other processes and machines.
+    """A job for a worker; it is sent to other processes and machines.
 
     Parameters
     ----------
     work
         Called with an item; what it keeps between calls belongs to the process.
     items
-        Of the frames, by their numbers.
+        Items of the frames, by their numbers.
     output
         A store of shards, beside which the ledger lies.
     count
@@ -98,7 +98,7 @@ class Task:
 
     @cached_property
     def ledger(self) -> Ledger:
-        """What is done."""
+        """Ledger of the frames done."""
         return Ledger.beside(self.output)
 
     @property
@@ -133,7 +133,7 @@ class Task:
                 yield number, self._noted(number, thing, cost)
 
     def _results(self, items: list[Any]) -> Iterator[Sequence[Any]]:
-        """What the work gives of some items at a time, or what it raises."""
+        """Results of some items at a time, or the exceptions that they raise."""
         if isinstance(self.work, SideBySide):
             yield from self.work.several(items)
         else:
@@ -162,7 +162,7 @@ class Task:
         ))  # fmt: skip
 
     def is_done(self, number: int, *, content: bool = False) -> bool:
-        """Whether a frame is noted, and what it wrote is there; as its checksums say, if `content`."""
+        """True if a frame is recorded and its files are there; with `content`, with their checksums."""
         entry = self.ledger.entry(number)
         return entry is not None and series.is_whole(self.output, entry.files, content=content)
 
@@ -210,7 +210,7 @@ def _measured() -> Iterator[_Cost]:
 
 
 def _tried(function: Callable[..., Any], *given: Any) -> Any:
-    """What a function gives, or the error that it raises."""
+    """Result of a function, or the error that it raises."""
     try:
         return function(*given)
     except (KeyboardInterrupt, SystemExit):
@@ -220,7 +220,7 @@ def _tried(function: Callable[..., Any], *given: Any) -> Any:
 
 
 def _is_full(error: BaseException | None) -> bool:
-    """Whether an error is of a disk without room."""
+    """True if an error comes from a full disk."""
     if error is None:
         return False
     own = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)

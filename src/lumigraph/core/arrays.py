@@ -45,7 +45,7 @@ PART = 2**15
 """Values that are treated at a time, one operation after the other: they stay in a processor's own cache."""
 
 _HELD: dict[tuple, Array] = {}
-"""What `held` has copied to other devices."""
+"""Copies that `held` has made on other devices."""
 
 _SINGLE = ("float32", "complex64", "float16")
 
@@ -80,18 +80,18 @@ def as_numpy(array: Array, dtype: "DTypeLike | None" = None, copy: bool | None =
 
 
 def is_numpy(array: Array) -> bool:
-    """Whether the array is a NumPy array."""
+    """True for a NumPy array."""
     return is_numpy_array(array)
 
 
 def is_single(array: Array) -> bool:
-    """Whether the array holds single precision: float32 or complex64."""
+    """True for single precision: float32 or complex64."""
     # NumPy's name leaves out the byte order, which str() has: '>f4'.
     return (array.dtype.name if is_numpy_array(array) else str(array.dtype).rsplit(".", 1)[-1]) in _SINGLE
 
 
 def is_complex(array: Array) -> bool:
-    """Whether the array holds complex numbers."""
+    """True for complex numbers."""
     return bool(namespace(array).isdtype(array.dtype, "complex floating"))
 
 
@@ -119,7 +119,7 @@ def like(values: np.ndarray, array: Array) -> Array:
 
 
 def is_here(array: Array) -> bool:
-    """Whether the array stands in the processor's memory."""
+    """True for an array in the processor's memory."""
     return is_numpy_array(array) or "cpu" in str(device(array)).lower()
 
 
@@ -138,7 +138,7 @@ def held(values: np.ndarray, array: Array, *chosen: int | slice) -> Array:
 
 
 def is_parameter(value: Any) -> bool:
-    """Whether a number is a 0-d array of a library other than NumPy, such as a PyTorch scalar."""
+    """True for a 0-d array of a library other than NumPy, such as a PyTorch scalar."""
     return getattr(value, "shape", None) == () and not is_numpy_array(value) and not np.isscalar(value)
 
 

@@ -1,4 +1,4 @@
-"""Lenslets that stand beside the points of their lattice."""
+"""Lenslets that are displaced from the points of their lattice."""
 
 from dataclasses import dataclass
 
@@ -10,14 +10,14 @@ from lumigraph.errors import CalibrationError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Aside:
-    """By how much micro-images of some lenslets stand beside a regular lattice.
+    """Offsets of the micro-images of some lenslets from a regular lattice.
 
     Parameters
     ----------
     indices
-        Of the lenslets (k, 2), as (i, j).
+        Indices of the lenslets (k, 2), as (i, j).
     ways
-        From the lattice to their micro-images (k, 2), as (y, x) [px].
+        Offsets of their micro-images from the lattice (k, 2), as (y, x) [px].
 
     Raises
     ------
@@ -45,7 +45,7 @@ class Aside:
             raise CalibrationError("ways of lenslets aside must be finite [px].")
 
     def of(self, indices: np.ndarray) -> np.ndarray:
-        """Ways (..., 2) of lenslets (..., 2): 0 of those that are not named."""
+        """Offsets (..., 2) of lenslets (..., 2); 0 for those that are not named."""
         found = np.zeros(np.shape(indices))
         for index, way in zip(self.indices, self.ways, strict=True):
             found[(indices == index).all(-1)] = way

@@ -1,4 +1,4 @@
-"""Matrices whose rows see few columns each, in blocks."""
+"""Banded matrices, stored in blocks."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ _ROWS, _JOINED = 64, 8
 
 @dataclass(frozen=True, eq=False)
 class Banded:
-    """Matrix (rows, columns) of blocks of rows that see few columns each.
+    """Matrix (rows, columns) of blocks of rows with few nonzero columns each.
 
     Parameters
     ----------
     columns
-        Their number.
+        Number of columns.
     blocks
         (first column, matrix), row after row.
     """
@@ -30,12 +30,12 @@ class Banded:
 
     @property
     def nbytes(self) -> int:
-        """Of the blocks."""
+        """Memory of the blocks [bytes]."""
         return sum(m.nbytes for _, m in self.blocks)
 
     @property
     def rows(self) -> int:
-        """Their number."""
+        """Number of rows."""
         return sum(len(m) for _, m in self.blocks)
 
     def _parts(self, like: Array) -> Iterator[tuple[slice, slice, Array]]:
@@ -52,7 +52,7 @@ class Banded:
         return tuple(_joined(self.blocks[start : start + _JOINED]) for start in starts)
 
     def seeing(self, columns: slice) -> tuple[slice, "Banded"]:
-        """The rows of all blocks that see some of these columns, and their part of the matrix."""
+        """Rows of all blocks that use some of these columns, and their part of the matrix."""
         rows, blocks, row = [], [], 0
         for first, m in self.blocks:
             start, stop = max(first, columns.start), min(first + m.shape[1], columns.stop)

@@ -1,4 +1,4 @@
-"""What an object shows of itself in a few lines: arrays by type and shape, long lists by their ends."""
+"""Short representations of objects: arrays by type and shape, long lists by their ends."""
 
 import re
 import textwrap
@@ -9,7 +9,7 @@ from typing import Any
 from lumigraph.core import picture
 
 WIDTH, LINES = 100, 8
-"""Of the text."""
+"""Size of the text."""
 
 MANY = 6
 """Members of a list or a mapping that are all shown."""
@@ -35,7 +35,7 @@ def brief(self: Any) -> str:
 
 
 def called(thing: Any) -> str:
-    """What people call a type, or a thing of it.
+    """Plain name of a type, or of the type of an object.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Remembering what is dearer to compute than to keep, within one bound of memory for all that is kept."""
+"""Caches of results that are costly to compute, within one memory budget for all."""
 
 import os
 import sys
@@ -18,7 +18,7 @@ _SHARE, _LEAST, _MOST = 0.25, 2**28, 4 * 2**30
 
 
 class Budget:
-    """What several caches keep, in the order of its last use, within a number of bytes for all of them.
+    """Shared memory budget of several caches: the entry used longest ago is dropped first.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Budget:
         return self._limit
 
     def found(self, key: tuple[Hashable, Hashable]) -> Any:
-        """What is kept under a key, now the last to go; None where nothing is."""
+        """Entry under a key, now the last to be dropped; None if there is none."""
         with self._lock:
             if key not in self._kept:
                 return None
@@ -58,13 +58,13 @@ class Budget:
                 self.used -= self._kept.popitem(last=False)[1][1]
 
     def forget(self, cache: Hashable) -> None:
-        """Drop what one cache keeps."""
+        """Remove the entries of one cache."""
         with self._lock:
             for key in [key for key in self._kept if key[0] is cache]:
                 self.used -= self._kept.pop(key)[1]
 
     def empty(self) -> None:
-        """Drop what all caches keep."""
+        """Remove the entries of all caches."""
         with self._lock:
             self._kept.clear()
             self.used = 0
@@ -124,7 +124,7 @@ class ByteCache:
         return found
 
     def clear(self) -> None:
-        """Forget everything that this cache keeps."""
+        """Remove everything from this cache."""
         self._budget.forget(self)
 
 

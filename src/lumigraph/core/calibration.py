@@ -21,7 +21,7 @@ def _none() -> np.ndarray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """Where the micro-images stand on a raw image, and how light reached them.
+    """Positions of the micro-images on a raw image, and how light reached them.
 
     Micro-images stand at `position(indices)`: the points of `lattice`, moved by `warp` and `aside` where the
     camera has them. Whoever needs a place on the picture asks `position`, `index`, `offset` or
@@ -40,7 +40,7 @@ class Calibration:
         Root mean square distance of the measured centres from the lattice [px]; NaN, or 0, where none was
         measured (`measured`).
     pixel_pitch
-        Of the sensor [m]; None where unknown.
+        Pixel pitch of the sensor [m]; None where unknown.
     separation
         Main lens to lenslets, F or z2 + a [m]; None where unknown.
     lenslet_distance
@@ -57,9 +57,9 @@ class Calibration:
     sharpness
         Contrast of each of the three kinds of lenslets, `lattice.kind`, over their mean; empty for one kind.
     notes
-        What to know before trusting the result, one sentence each.
+        Cautions about the result, one sentence each.
     by_maker
-        Whether it is the file of a camera's maker, which gives pitch and rotation well, but not where a
+        True for the file of a camera's maker, which gives pitch and rotation well, but not where a
         picture was cropped: `calibration.aligned` moves it.
     aside
         Ways of single lenslets beside the lattice; None where all stand on it.
@@ -109,7 +109,7 @@ class Calibration:
 
     @property
     def measured(self) -> bool:
-        """Whether `centers` were measured on a picture: else they are the lattice points themselves."""
+        """True if `centers` were measured on a picture; otherwise they are the lattice points themselves."""
         return self.residual_px > 0  # false for NaN
 
     @property
@@ -141,7 +141,7 @@ class Calibration:
         return points if self.warp is None else self.warp.applied(points)
 
     def flat(self, indices: np.ndarray) -> np.ndarray:
-        """Where micro-image centres would stand without the warp (..., 2) [px]."""
+        """Micro-image centres without the warp (..., 2) [px]."""
         points = self.lattice.position(indices)
         return points if self.aside is None else points + self.aside.of(indices)
 
@@ -157,7 +157,7 @@ class Calibration:
         return self.lattice.index(*self.straightened(y, x))
 
     def offset(self, y: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Way (dy, dx) [px] from the centre of its micro-image to each place; y and x broadcast."""
+        """Offset (dy, dx) [px] of each place from the centre of its micro-image; y and x broadcast."""
         center = self.position(np.stack(self.index(y, x), -1))
         return y - center[..., 0], x - center[..., 1]
 
@@ -174,7 +174,7 @@ class Calibration:
         return indices[inside]
 
     def misses(self, indices: np.ndarray) -> np.ndarray:
-        """Which lenslets (...) of (..., 2) as (i, j) are missing."""
+        """True for missing lenslets (...), of indices (..., 2) as (i, j)."""
         keys = [each[..., 0] * (1 << 32) + each[..., 1] for each in (indices, self.missing)]
         return np.isin(keys[0], keys[1])
 
@@ -199,12 +199,12 @@ class Calibration:
         )
 
     def require_regular(self, what: str) -> None:
-        """Refuse what needs lenslets that stand on a lattice.
+        """Refuse lenslets that are displaced from the lattice, for `what` needs a regular one.
 
         Raises
         ------
         CalibrationError
-            Some stand beside it.
+            Some are displaced.
         """
         if self.aside is not None:
             raise CalibrationError(

@@ -1,4 +1,4 @@
-"""What fraction of each sample's area a shape covers: the grey edges of stops, lenslets and targets.
+"""Area fraction of each sample that a shape covers: the grey edges of stops, lenslets and targets.
 
 A hard edge on a coarse grid is wrong by up to half a sample; with area fractions the power through a
 shape is exact. Shapes are centred on the axis unless offsets say otherwise; all is NumPy in float64.
@@ -56,7 +56,7 @@ def disc(y: np.ndarray, x: np.ndarray, radius: float, pitch: tuple[float, float]
     y, x
         Centres of the samples; they broadcast against each other.
     radius
-        Of the disc.
+        Radius of the disc.
     pitch
         Size of a sample (dy, dx).
     """

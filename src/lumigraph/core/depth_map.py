@@ -18,7 +18,7 @@ from lumigraph.errors import GeometryError
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {"disparity": "px", "alpha": "1", "patch": "px", "virtual depth": "1", "depth": "m"}
 )
-"""What a map may hold, and its unit.
+"""Quantities of a map, and their units.
 
 - disparity: lenslets that a point moves from one view to the next; positive is nearer than the plane in focus
 - alpha: refocus factor α' = F/F'; above 1 is farther
@@ -42,7 +42,7 @@ class DepthMap(Noun[A]):
         One of `QUANTITIES`.
     error
         Mean distance from the truth to expect of each value (y, x), in its unit; None where the method
-        cannot tell.
+        does not estimate it.
 
     Raises
     ------
@@ -86,7 +86,7 @@ class DepthMap(Noun[A]):
 
     @property
     def unit(self) -> str:
-        """Of the values: "px", "1" or "m"."""
+        """Unit of the values: "px", "1" or "m"."""
         return QUANTITIES[self.quantity]
 
     @property
@@ -144,7 +144,7 @@ class DepthMap(Noun[A]):
     def replaced(
         self, values: np.ndarray, quantity: str, slope: np.ndarray | float | None = None
     ) -> "DepthMap":
-        """The map with other values; of what cannot be told, NaN, the confidence becomes 0.
+        """Map with other values; where they are NaN, the confidence becomes 0.
 
         `slope` is how much they change with the values before; where None, expected errors are not known.
         """

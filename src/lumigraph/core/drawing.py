@@ -1,4 +1,4 @@
-"""Where nouns find what draws them: core knows no drawing library, `lumigraph` itself says who does."""
+"""Registry of drawing functions: `core` imports no drawing library, `lumigraph` registers one."""
 
 TYPE_CHECKING = False  # `typing` is slow to import, and `import lumigraph` imports this
 if TYPE_CHECKING:
@@ -9,7 +9,7 @@ _home: "Callable[[], Any] | None" = None
 
 
 def done_by(home: "Callable[[], Any]") -> None:
-    """Take the functions that draw from what `home` gives; it is called when the first thing is drawn."""
+    """Register the drawing functions that `home` returns; it is called at the first drawing."""
     global _home
     _home = home
 

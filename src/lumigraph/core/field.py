@@ -22,7 +22,7 @@ class Field:
     grid
         Where the samples stand.
     wavelength
-        In vacuum [m].
+        Wavelength in vacuum [m].
 
     Raises
     ------

@@ -1,11 +1,11 @@
-"""What stands still on a raw image whatever the scene shows: the dark gaps between micro-images."""
+"""Dark gaps between micro-images: the part of a raw image that does not depend on the scene."""
 
 import numpy as np
 from scipy import ndimage
 
 
 def valleys(picture: np.ndarray, sigma: float) -> np.ndarray:
-    """How sharply the logarithm of a picture is curved upwards: the dark gaps between micro-images.
+    """Upward curvature of the logarithm of a picture (y, x): the dark gaps between micro-images.
 
     Gaps stand still whatever the scene shows behind the lenslets, and the logarithm takes vignetting and
     brightness out, so that this finds lattices on raw images and behind thin gaps.
@@ -15,7 +15,7 @@ def valleys(picture: np.ndarray, sigma: float) -> np.ndarray:
     picture
         Brightness (y, x).
     sigma
-        Of the smoothing [px].
+        Standard deviation of the smoothing [px].
     """
     smooth = logarithm(ndimage.gaussian_filter(np.asarray(picture, np.float32), sigma))
     curved = ndimage.correlate1d(smooth, np.array([1, -2, 1], np.float32), axis=0)

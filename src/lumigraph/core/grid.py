@@ -1,4 +1,4 @@
-"""Where samples stand on a plane."""
+"""Sampling of a plane: `Grid`."""
 
 from dataclasses import dataclass
 

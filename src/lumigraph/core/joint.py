@@ -65,12 +65,12 @@ class Joint(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of all maps together, at most [bytes]."""
+        """Memory of all maps together, at most [bytes]."""
         return sum(one.memory_bytes for one in self.maps)
 
     @property
     def error(self) -> float:
-        """At most the largest of the maps'."""
+        """Largest error of the maps, an upper bound."""
         return max(one.error for one in self.maps)
 
 
@@ -97,7 +97,7 @@ def _check_same_object(first: Linear, other: Linear, number: int) -> None:
 
 
 def _alike(one: Grid, other: Grid) -> bool:
-    """Whether samples coincide to a millionth of the pitch."""
+    """True if the samples of both grids coincide to a millionth of the pitch."""
     return all(
         abs(a - b) <= 1e-6 * p
         for mine, theirs in ((one.pitch, other.pitch), (one.center, other.center))

@@ -25,15 +25,15 @@ class Labels:
     axes
         Names, such as "yx"; "c" may follow them.
     name, unit
-        Of the values.
+        Name and unit of the values.
     along
         Coordinates by axis, or by name where they take several: arrays of their own with the axes' names.
     units
-        Of coordinates by name; "m" for the others.
+        Units of coordinates by name; "m" for the others.
     pitches
-        Of axes by name: one sample alone does not show its pitch.
+        Pitches of axes by name: one sample alone does not show its pitch.
     attributes
-        By name; None is left out.
+        Attributes by name; None is left out.
     data
         The array.
     """
@@ -54,7 +54,7 @@ class Labels:
         return self
 
     def grid(self, names: str = "yx") -> Grid:
-        """Where the samples stand along two axes."""
+        """Grid of the samples along two axes."""
         (y, dy), (x, dx) = (self._even(name) for name in names)
         return Grid((len(y), len(x)), (dy, dx), (y[len(y) // 2], x[len(x) // 2]))
 

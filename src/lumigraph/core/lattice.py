@@ -1,4 +1,4 @@
-"""Where lenslets stand: in a simulation [m], or as micro-images on a sensor [px]."""
+"""Lattices: positions of lenslets in a simulation [m], or of micro-images on a sensor [px]."""
 
 import math
 from collections.abc import Sequence

@@ -9,7 +9,7 @@ from lumigraph.core.labelled import Labels
 from lumigraph.errors import SamplingWarning
 
 LayerData = tuple[np.ndarray, dict[str, Any], str]
-"""What `napari.layers.Layer.create` takes."""
+"""Arguments of `napari.layers.Layer.create`."""
 
 _UNITS = {"m": (1e6, "micrometer"), "px": (1.0, "pixel")}
 _EVEN = 1e-6
@@ -26,11 +26,11 @@ def image(data: np.ndarray, labels: Labels, noun: Any, name: str) -> LayerData:
     data
         The array; a last axis beside those of the labels is colour.
     labels
-        Its coordinates and units.
+        Coordinates and units.
     noun
-        What ``metadata["lumigraph"]`` holds.
+        Object that ``metadata["lumigraph"]`` holds.
     name
-        Of the layer.
+        Name of the layer.
     """
     axes = labels.axes
     placed = [_placed(labels, axis, data.shape[k]) for k, axis in enumerate(axes)]

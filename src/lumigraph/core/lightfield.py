@@ -30,7 +30,7 @@ class LightField(Noun[A]):
     separation
         Main lens to lenslets, F [m].
     valid
-        Which samples (v, u, t, s) rest on good pixels, true or false; None where all do. What sums over
+        True for samples (v, u, t, s) that rest on good pixels; None where all do. What sums over
         views leaves the others out.
 
     Raises

@@ -16,7 +16,7 @@ from lumigraph.errors import GeometryError
 Shape = tuple[int, ...]
 
 GIVEN = "an object", "a raw image"
-"""What `forward` and `adjoint` take, as errors name it."""
+"""Names in errors of what `forward` and `adjoint` take."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, kw_only=True)
@@ -35,9 +35,9 @@ class Linear(ABC):
     object_grid
         Samples of the object, of every plane of it; None where it is not known.
     depths
-        Of an object's planes from the focused one (z,) [m]; None for one plane (y, x).
+        Depths of an object's planes from the focused one (z,) [m]; None for one plane (y, x).
     resolved_pitch
-        Of samples that hold all that a raw image shows of the focused plane [m]: half the shortest period
+        Pitch of samples that hold all of the focused plane in a raw image [m]: half the shortest period
         that the instrument resolves; None where it is not known.
     """
 
@@ -50,7 +50,7 @@ class Linear(ABC):
     @property
     @abstractmethod
     def shape(self) -> tuple[Shape, Shape]:
-        """Of what `forward` gives (the raw image), and of what it takes (the object)."""
+        """Shapes of what `forward` returns (the raw image) and of what it takes (the object)."""
 
     @abstractmethod
     def _forward(self, intensity: Array) -> Array: ...
@@ -178,7 +178,7 @@ class Transposed(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """The map's, the other way round."""
+        """Shapes of the map, exchanged."""
         return self.of.shape[1], self.of.shape[0]
 
     def _forward(self, intensity: Array) -> Array:
@@ -189,7 +189,7 @@ class Transposed(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of the map [bytes]."""
+        """Memory of the map [bytes]."""
         return self.of.memory_bytes
 
 
@@ -216,7 +216,7 @@ class Chain(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of what the last map gives, and of what the first one takes."""
+        """Shapes of the last map's output and of the first map's input."""
         return self.maps[-1].shape[0], self.maps[0].shape[1]
 
     def _forward(self, intensity: Array) -> Array:
@@ -231,12 +231,12 @@ class Chain(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of all maps together [bytes]."""
+        """Memory of all maps together [bytes]."""
         return sum(part.memory_bytes for part in self.maps)
 
     @property
     def error(self) -> float:
-        """At most what those of the maps come to."""
+        """Sum of the maps' errors, an upper bound."""
         return sum(part.error for part in self.maps)
 
 
@@ -253,12 +253,12 @@ class _Side(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of all maps together [bytes]."""
+        """Memory of all maps together [bytes]."""
         return sum(part.memory_bytes for part in self.maps)
 
     @property
     def error(self) -> float:
-        """At most the largest of the maps'."""
+        """Largest error of the maps, an upper bound."""
         return max(part.error for part in self.maps)
 
 
@@ -269,7 +269,7 @@ class Sum(_Side):
     Parameters
     ----------
     maps
-        At least one.
+        One map or more.
     weights
         One for each.
 
@@ -285,7 +285,7 @@ class Sum(_Side):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of every map."""
+        """Output and input shape, the same for every map."""
         return self.maps[0].shape
 
     def _forward(self, intensity: Array) -> Array:
@@ -303,7 +303,7 @@ class Slices(_Side):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of one raw image, and of all planes."""
+        """Shapes of one raw image and of all planes."""
         raw, plane = self.maps[0].shape
         return raw, (len(self.maps), *plane)
 
@@ -322,11 +322,11 @@ def stack(
     Parameters
     ----------
     maps
-        Of one shape.
+        Maps of one shape.
     object_grid
         Samples of every plane; None for the first map's.
     depths
-        Of the planes from the focused one (z,) [m].
+        Depths of the planes from the focused one (z,) [m].
 
     Raises
     ------

@@ -21,7 +21,7 @@ class Matrix(Linear):
     matrix
         (raw samples, object samples), of NumPy, or of SciPy in compressed rows (``csr``).
     raw_shape, object_shape
-        Of what it makes, and of what it takes.
+        Shapes of output and input.
 
     Raises
     ------
@@ -51,12 +51,12 @@ class Matrix(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of the raw image and of the object."""
+        """Shapes of the raw image and of the object."""
         return self.raw_shape, self.object_shape
 
     @property
     def memory_bytes(self) -> float:
-        """Of the numbers that are kept [bytes]."""
+        """Memory of the stored numbers [bytes]."""
         kept = self.matrix if isinstance(self.matrix, np.ndarray) else self.matrix.data
         return float(kept.nbytes)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from lumigraph.errors import LumigraphError, SamplingError
 
 _GROUP = Path("/sys/fs/cgroup")
-"""Of this process' control group, version 2: a container's bounds."""
+"""Files of this process' control group, version 2: a container's bounds."""
 
 
 def available() -> int | None:
@@ -29,7 +29,7 @@ def _free() -> int | None:
 
 
 def _free_of_group() -> int | None:
-    """What the control group may still take: pages of files that nobody uses are given back."""
+    """Memory that the control group may still use [bytes], the cache of unused file pages included."""
     try:
         most, used = (
             int((_GROUP / f"memory.{name}").read_text(encoding="ascii")) for name in ("max", "current")
@@ -51,7 +51,7 @@ def total() -> int | None:
 
 
 def told(size: float) -> str:
-    """Bytes as people read them.
+    """Text of a number of bytes, with a suitable unit.
 
     >>> told(512), told(5.5 * 2**20), told(3 * 2**30)
     ('512 B', '5.5 MiB', '3 GiB')
@@ -82,7 +82,7 @@ def give_back() -> None:
 
 
 _TRIM, _MAPPED, _ARENAS, _MOST = -1, -3, -8, 2**31 - 1
-"""Of glibc's `mallopt`: what is free at the end before it is given back, from which size memory is mapped by
+"""Options of glibc's `mallopt`: what is free at the end before it is given back, size of memory mapped by
 itself, how many heaps there are; and its largest number."""
 
 

@@ -1,4 +1,4 @@
-r"""Products with matrices that are alike from both ends, :math:`M_{-i, -j} = M_{ij}`, by halves.
+r"""Products with centrosymmetric matrices, :math:`M_{-i, -j} = M_{ij}`, by halves.
 
 Such a matrix turns even data into even and odd into odd, so that two matrices of half the rows and columns
 do: half of the arithmetic.
@@ -12,12 +12,12 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mirrored:
-    """A matrix (rows, columns) that is alike from both ends.
+    """A centrosymmetric matrix (rows, columns).
 
     Parameters
     ----------
     shape
-        Of the matrix.
+        Shape of the matrix.
     even, odd
         (rows - rows // 2, columns - columns // 2): from the upper halves of even and odd data to those of
         what they become.
@@ -45,7 +45,7 @@ class Mirrored:
 
     @property
     def transposed(self) -> "Mirrored":
-        """The transpose, which is alike from both ends as well."""
+        """The transpose, which is centrosymmetric, too."""
         (rows, columns), even = self.shape, self.even.T.copy()
         if rows % 2:
             even[:, 0] /= 2  # as `of` has what stands in the middle of a row
@@ -55,7 +55,7 @@ class Mirrored:
 
     @property
     def nbytes(self) -> int:
-        """Of the halves."""
+        """Memory of both halves [bytes]."""
         return self.even.nbytes + self.odd.nbytes
 
     def down(self, data: np.ndarray) -> np.ndarray:
@@ -75,7 +75,7 @@ def by_halves(
     *,
     axis: int,
 ) -> np.ndarray:
-    """What halves along an axis of data become, put together to `count` along it.
+    """Result (`count` along the axis) of applying separate functions to the even and odd half of data.
 
     `even` takes the sum of the upper half and the mirrored lower one and gives the even result's upper half,
     `odd` their difference and gives the odd one's. Halves of odd counts begin in the middle.

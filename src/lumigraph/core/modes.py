@@ -25,7 +25,7 @@ class CoherentModes:
     fields
         A `Field` (modes, y, x), or several: one for each wavelength. A field (y, x) is one mode.
     error
-        How far off J may be between any two samples, over the largest intensity; 0 where all modes are there.
+        Largest error of J between any two samples, over the largest intensity; 0 where all modes are there.
 
     Raises
     ------
@@ -68,7 +68,7 @@ class CoherentModes:
 
     @property
     def grid(self) -> Grid:
-        """Where the samples of all modes stand.
+        """Grid that all modes share.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class CoherentModes:
 
     @property
     def wavelengths(self) -> tuple[float, ...]:
-        """In vacuum [m]."""
+        """Wavelengths in vacuum [m]."""
         return tuple(field.wavelength for field in self.fields)
 
     @property
@@ -109,7 +109,7 @@ class CoherentModes:
 
 
 def _stacked(field: Field) -> Field:
-    """With one leading axis, that of the modes."""
+    """Field with one leading axis, the modes."""
     if field.data.ndim not in (2, 3):
         raise GeometryError(
             f"a field of the modes has shape {tuple(field.data.shape)} but must be (modes, y, x), or (y, x)."

@@ -1,4 +1,4 @@
-"""What the nouns share: NumPy reads them, they draw themselves, xarray and napari get named axes."""
+"""Base of the data types: NumPy reads them, they draw themselves, xarray and napari get named axes."""
 
 from abc import abstractmethod
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self
@@ -35,7 +35,7 @@ class Noun(Generic[A]):
         return as_numpy(getattr(self, self.pixels), dtype, copy)
 
     def plot(self, **options: Any) -> Any:
-        """A matplotlib Figure of it, as `lumigraph.plots.show` draws it; no window is opened."""
+        """Matplotlib Figure, as `lumigraph.plots.show` draws it; no window is opened."""
         return draw("show", self, **options)
 
     def to_xarray(self) -> Any:
@@ -51,14 +51,14 @@ class Noun(Generic[A]):
         Parameters
         ----------
         name
-            Of the layer; that of the type if left out.
+            Name of the layer; that of the type if left out.
         """
         array = as_numpy(getattr(self, self.pixels))
         return layers.image(array, self._labels(), self, name or type(self).__name__)
 
     @classmethod
     def from_xarray(cls, array: Any) -> Self:
-        """What `to_xarray` gave, also after a selection along its axes.
+        """Object restored from `to_xarray`, also after a selection along its axes.
 
         Raises
         ------

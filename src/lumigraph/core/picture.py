@@ -79,7 +79,7 @@ def length(value: float | None) -> str:
 
 
 def numbers(data: Any) -> str:
-    """What an array holds, such as "uint16, 0 to 4095"."""
+    """Data type and range of an array, such as "uint16, 0 to 4095"."""
     values = to_numpy(data)
     finite = values if values.dtype.kind in "iub" else values[np.isfinite(values)]
     if not finite.size:
@@ -118,13 +118,13 @@ def card(title: str, rows: Iterable[tuple[str, str]], picture: str = "", alt: st
     Parameters
     ----------
     title
-        What it is.
+        Heading.
     rows
         Names, and values with their units; all are escaped.
     picture
         Data URI, or empty.
     alt
-        What the picture shows.
+        Description of the picture.
     """
     cells = "".join(
         f'<tr><th scope="row" style="{_NAME}">{html.escape(name)}</th>'

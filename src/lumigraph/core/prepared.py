@@ -42,7 +42,7 @@ class Verdicts:
     indices
         Lenslets (k, 2) as (i, j).
     reasons
-        Of each (k,), uint8.
+        Reason of each lenslet (k,), uint8.
     """
 
     indices: np.ndarray
@@ -52,12 +52,12 @@ class Verdicts:
 
     @property
     def valid(self) -> np.ndarray:
-        """Which lenslets count (k,), true or false."""
+        """True for lenslets that count (k,)."""
         return self.reasons == Reason.GOOD
 
     @property
     def lost(self) -> np.ndarray:
-        """Which lenslets decoding leaves out (k,): a saturated one is bright all the same."""
+        """True for lenslets that decoding leaves out (k,); saturated ones are bright and stay."""
         return np.isin(self.reasons, (Reason.DARK, Reason.MASKED, Reason.DEAD))
 
 
@@ -74,14 +74,14 @@ class PreparedImage(RawImage):
     lenslets
         A `Reason` for each lenslet; None without a calibration.
     background
-        What its pixels read without light, in its values: a number or (y, x); None where unknown, 0 where
+        Reading of its pixels without light, in its values: a number or (y, x); None where unknown, 0 where
         it has been subtracted.
     response
         Light that reaches each micro-image (y, x), up to 1; None where unknown, or divided out.
     divisor
         Light of the white image that was divided out (y, x), up to 1, float16; None where none was.
     notes
-        What was done and found, one sentence each.
+        Notes on what was done and found, one sentence each.
     """
 
     calibration: Calibration | None = None
@@ -96,7 +96,7 @@ class PreparedImage(RawImage):
 
     @property
     def valid(self) -> np.ndarray:
-        """Which pixels count (y, x), true or false."""
+        """True for pixels that count (y, x)."""
         return self.reasons == Reason.GOOD
 
     @property

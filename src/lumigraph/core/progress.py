@@ -1,4 +1,4 @@
-"""How far a computation has come: one kind of function is told, with the fraction that is done."""
+"""Progress of a computation: callbacks that receive the fraction done."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,7 @@ Progress = Callable[[float], None]
 
 
 class Stage(float):
-    """A fraction that also says what goes on, for a bar's description.
+    """Fraction with a description of the current step, for a progress bar.
 
     >>> fraction = Stage(0.25, "raw image")
     >>> print(fraction, fraction.what)
@@ -24,16 +24,16 @@ class Stage(float):
 
 
 def silent(fraction: float) -> None:
-    """Progress that nobody looks at."""
+    """Progress callback that does nothing."""
 
 
 def within(progress: Progress | None, first: float, last: float, what: str = "") -> Progress:
-    """What a part of a computation is to tell, so that it goes from `first` to `last` of the whole.
+    """Callback for a part of a computation that runs from `first` to `last` of the whole.
 
     Parameters
     ----------
     progress
-        Of the whole.
+        Callback of the whole.
     first, last
         Fractions of the whole.
     what
@@ -53,7 +53,7 @@ def within(progress: Progress | None, first: float, last: float, what: str = "")
 
 
 def part(progress: Progress | None, number: int, count: int) -> Progress:
-    """What one of `count` equal parts of a computation is to tell.
+    """Callback for part `number` of `count` equal parts of a computation.
 
     >>> part(print, 1, 4)(0.5)
     0.375
@@ -62,5 +62,5 @@ def part(progress: Progress | None, number: int, count: int) -> Progress:
 
 
 def what_of(fraction: float) -> str:
-    """What a fraction says that goes on; empty where it says nothing."""
+    """Description of the current step that a fraction carries; empty if it carries none."""
     return fraction.what if isinstance(fraction, Stage) else ""

@@ -1,4 +1,4 @@
-"""What a sensor read out."""
+"""Raw images: the numbers that a sensor read out."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""What a verb found: `Result`, which text, JSON, reports and notebooks read."""
+"""Results of verbs: `Result`, which text output, JSON, reports and notebooks read."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ class Quantity:
     Parameters
     ----------
     name
-        As programs read it, such as "pitch_px".
+        Name for programs, such as "pitch_px".
     value
         Number, text, or several of them; lengths in metres.
     unit
@@ -78,11 +78,11 @@ class Figure:
         An array (y, x[, 3]), a `RawImage`, a matplotlib figure, text that keeps its lines, or
         the rows of a table, its header first.
     caption
-        What it shows.
+        Caption.
     section
         Heading that it stands under.
     options
-        As `report.pictures.picture` takes them.
+        Options of `report.pictures.picture`.
     """
 
     image: Any
@@ -93,14 +93,14 @@ class Figure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
-    """What a verb found.
+    """Result of a verb: the object made, named quantities, pictures and notes.
 
     Parameters
     ----------
     title, about
-        Of a report: a word, and a sentence.
+        Heading of a report: a word, and a sentence.
     thing
-        What was made: views, a picture, a volume, a map, ...
+        Object that was made: views, a picture, a volume, a map, ...
     headline
         Lines that people read first.
     quantities
@@ -108,15 +108,15 @@ class Result:
     figures
         Gives the pictures of a report; called only for one.
     notes
-        What was done and what to know, one sentence each.
+        Notes on what was done and what to know, one sentence each.
     written
         Files.
     extra
-        What only programs read.
+        Values for programs only.
     rows
-        What programs read instead of named values, where that is a list.
+        Values for programs in place of named values, where they form a list.
     failure
-        Why the command ends with an error after all is told; empty where it does not.
+        Reason why the command ends with an error after its output; empty if it does not.
     """
 
     title: str
@@ -132,12 +132,12 @@ class Result:
     failure: str = ""
 
     def text(self, known: Sequence[str] = ()) -> str:
-        """What people read on a terminal, without the notes that they have read already."""
+        """Text for a terminal, without the notes in `known`, which were printed before."""
         notes = (f"note: {note}" for note in self.notes if note not in known)
         return "\n".join((*self.headline, *notes, *(f"written {path}" for path in self.written)))
 
     def values(self) -> dict[str, Any]:
-        """What programs read: values by name, lengths in metres, intervals as name_interval."""
+        """Values for programs: by name, lengths in metres, intervals as name_interval."""
         found: dict[str, Any] = {one.name: one.value for one in self.quantities}
         found |= {f"{one.name}_interval": one.interval for one in self.quantities if one.interval}
         found |= self.extra

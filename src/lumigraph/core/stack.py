@@ -28,7 +28,7 @@ class Stack(Noun[A]):
     positions
         One number for each picture: α' of a refocus stack, a depth, a time; empty where unknown.
     quantity
-        What the positions are: "alpha", "dz [m]", "lambda" (Lytro), "time [s]"; "page" where unknown.
+        Quantity of the positions: "alpha", "dz [m]", "lambda" (Lytro), "time [s]"; "page" where unknown.
     pixel_pitch
         Distance between pixels [m]; None where unknown.
     bit_depth
@@ -93,7 +93,7 @@ class Stack(Noun[A]):
 
     @property
     def titles(self) -> tuple[str, ...]:
-        """What each picture is, such as "alpha 0.95", "dz 20 mm" or "page 3"."""
+        """Title of each picture, such as "alpha 0.95", "dz 20 mm" or "page 3"."""
         name, _, unit = self.quantity.removesuffix("]").partition(" [")
         if not self.positions:
             return tuple(f"{name} {k}" for k in range(len(self)))

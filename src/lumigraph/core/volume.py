@@ -1,4 +1,4 @@
-"""What was reconstructed: intensities in space."""
+"""Reconstructed volumes: intensities in space."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
@@ -29,7 +29,7 @@ class Volume(Noun[A]):
     grid
         Where the samples of every plane stand [m].
     depths
-        Of the planes from the focused one (z,) [m], positive farther from the camera; ascending or
+        Depths of the planes from the focused one (z,) [m], positive farther from the camera; ascending or
         descending.
 
     Raises

@@ -1,4 +1,4 @@
-"""How a tilt and a lens' distortion move the points of a lattice."""
+"""Displacement of lattice points by a tilt and by a lens' distortion."""
 
 from dataclasses import dataclass, replace
 
@@ -15,7 +15,7 @@ _ENOUGH = 1e-10  # px, of an inverted distortion
 
 @dataclass(frozen=True, slots=True)
 class Warp:
-    r"""From the points of a regular lattice to where its micro-images stand on a picture, both in pixels.
+    r"""Map from the points of a regular lattice to the micro-images on a picture, both in pixels.
 
     With q the way from `center` to a lattice point, t the `tilt` and k the `radial` distortion,
 
@@ -77,7 +77,7 @@ class Warp:
         return replace(self, center=self.center[::-1], tilt=self.tilt[::-1])
 
     def largest(self, shape: tuple[int, int]) -> float:
-        """How far it moves the corners and the middles of the sides of a picture at most [px]."""
+        """Largest displacement of the corners and side midpoints of a picture [px]."""
         rows, columns = (np.array([0, (n - 1) / 2, n - 1]) for n in shape)
         points = np.stack(np.meshgrid(rows, columns, indexing="ij"), -1)
         return float(np.hypot(*np.moveaxis(self.applied(points) - points, -1, 0)).max())

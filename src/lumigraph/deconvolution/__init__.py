@@ -1,19 +1,12 @@
-"""Objects from raw images: what a camera must have seen, from a model of how it sees, a `core.linear.Linear`.
+"""Deconvolution: objects from raw images and a model of the camera, a `core.linear.Linear`.
 
-- `deconvolve`: `deconvolve`; for time series `deconvolve_series`, `Deconvolver`
-- `run`: from the first state to the last; `Step`, `Interrupted`
-- `side_by_side`: runs of several raw images that share each product of the operator
-- `together`: several raw images of one object
-- `beyond`: objects that reach beyond the picture, as far as light comes from
-- `coarse`: a warning where samples are too coarse to explain a raw image
-- `exposure`: `Exposure`, what is known of the raw image besides its values
-- `problem`: the three put together: model, sensitivity, deviance
-- `methods`: `Stop`, and what methods share
-- `richardson_lucy`: `RichardsonLucy`
-- `least_squares`: `LeastSquares`
-- `total_variation`, `wavelets`: priors `TotalVariation` and `Wavelets`
-- `filters`: `LowPass`, against artefacts of the lenslets
-- `checkpoint`: `Checkpoint`, a file from which a killed run goes on
+- `deconvolve`: `deconvolve`; for time series `deconvolve_series`, `Deconvolver`; `run`: `Step`, `Interrupted`
+- `exposure`, `problem`: what is known of the raw image; model, sensitivity and deviance
+- `methods`, `richardson_lucy`, `least_squares`: `Stop`, `RichardsonLucy`, `LeastSquares`
+- `total_variation`, `wavelets`, `filters`: priors, and `LowPass`, against artefacts of the lenslets
+- `together`, `side_by_side`: several raw images of one object; runs that share products of the operator
+- `beyond`, `coarse`: objects that reach beyond the picture; a warning of too coarse samples
+- `checkpoint`: `Checkpoint`, a file from which an interrupted run resumes
 """
 
 from lumigraph.deconvolution.checkpoint import Checkpoint

@@ -25,7 +25,7 @@ In that crop those just beside it are up to 17 times as bright as the inside, th
 """
 
 Inside = tuple[slice, slice]
-"""Where an object (y, x) stands in a larger one."""
+"""Slices (y, x) of an object in a larger one."""
 
 
 @runtime_checkable
@@ -41,13 +41,13 @@ class Widening(Protocol):
 
 
 def looks_beyond(operator: Linear) -> bool:
-    """Whether an operator, or one of several of an object, can look beyond the picture."""
+    """True if an operator, or one of several of an object, can look beyond the picture."""
     parts = operator.maps if isinstance(operator, Joint) else (operator,)
     return any(isinstance(part, Widening) for part in parts)
 
 
 def beyond(operator: Linear) -> tuple[Linear, Inside]:
-    """The operator of the object that light on the picture comes from, and what of it is asked for."""
+    """The operator of the object that light on the picture comes from, and the wanted part of it."""
     if isinstance(operator, Joint):
         return _all_beyond(operator)
     if isinstance(operator, Widening):
@@ -58,7 +58,7 @@ def beyond(operator: Linear) -> tuple[Linear, Inside]:
 
 
 def _all_beyond(operator: Joint) -> tuple[Linear, Inside]:
-    """Of several raw images: the object reaches as far as that of any of them."""
+    """Operator of several raw images: the object reaches as far as that of any of them."""
     if not looks_beyond(operator):
         return operator, (slice(None), slice(None))
     wide = [beyond(part) for part in operator.maps]
@@ -100,7 +100,7 @@ class Inner(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of the raw image, and of the larger object."""
+        """Shapes of the raw image, and of the larger object."""
         raw, inner = self.of.shape
         return raw, (*inner[:-2], *self.whole)
 
@@ -113,12 +113,12 @@ class Inner(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of the map [bytes]."""
+        """Memory of the map [bytes]."""
         return self.of.memory_bytes
 
     @property
     def error(self) -> float:
-        """Of the map."""
+        """Relative rms error of the map."""
         return self.of.error
 
 
@@ -128,7 +128,7 @@ def least_seen(operator: Linear) -> float:
 
 
 def cut(estimate: Array, inside: Inside, pictured: Array | None) -> Array:
-    """What is asked for of an object (..., y, x); 0 beside the picture."""
+    """The wanted part of an object (..., y, x); 0 beside the picture."""
     found = estimate[..., inside[0], inside[1]]
     if pictured is None:
         return found
@@ -138,7 +138,7 @@ def cut(estimate: Array, inside: Inside, pictured: Array | None) -> Array:
 
 
 def continued(start: Array, shape: tuple[int, ...], inside: Inside) -> Array:
-    """A first estimate of the inside as one of the whole, whose border goes on outwards."""
+    """First estimate of the whole from one of the inside, whose border is continued outwards."""
     if tuple(start.shape) == shape:
         return start
     margins = [(0, 0)] * (len(shape) - 2)

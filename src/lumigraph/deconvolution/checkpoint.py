@@ -1,4 +1,4 @@
-"""Where a deconvolution stands, kept in a file, so that a killed one goes on where it was."""
+"""State of a deconvolution in a file, from which an interrupted run resumes."""
 
 import hashlib
 import os
@@ -53,7 +53,7 @@ class Checkpoint:
 
     @classmethod
     def of(cls, place: "Checkpoint | str | os.PathLike[str]") -> "Checkpoint":
-        """Itself, or a checkpoint at a path."""
+        """Checkpoint at a path, or the given one."""
         if isinstance(place, Checkpoint):
             return place
         if not isinstance(place, str | os.PathLike):
@@ -63,7 +63,7 @@ class Checkpoint:
         return cls(Path(place))
 
     def keep(self, problem: Problem, state: State, key: str, *, now: bool = False) -> None:
-        """Write the state if it is time to, or `now`; a full disk ends in a warning, and the run goes on."""
+        """Write the state if it is time to, or `now`; on a full disk the run continues with a warning."""
         if not now and time.monotonic() - self._written < self.every:
             return
         content = {f"{_PREFIX}{name}": arrays.to_numpy(array) for name, array in state.memory.items()}
@@ -145,13 +145,13 @@ def _absorb(digest: Any, thing: Any) -> None:
 
 
 def _trace(problem: Problem) -> np.ndarray:
-    """Some of the sensitivity's values: they tell one operator from another."""
+    """Some of the sensitivity's values, which identify the operator."""
     values: Array = arrays.to_numpy(problem.scale.sensitivity).ravel()
     return values[:: max(1, values.size // 997)]
 
 
 def _read(path: Path) -> dict[str, np.ndarray] | None:
-    """What the file holds; None, with a warning, where it is a checkpoint that was damaged."""
+    """Content of the file; None, with a warning, where it is a checkpoint that was damaged."""
     try:
         content = store.read(path)
     except store.DamagedError:
@@ -169,7 +169,7 @@ def _read(path: Path) -> dict[str, np.ndarray] | None:
 
 
 def _sound(content: dict[str, np.ndarray]) -> bool:
-    """Whether all that is needed is there, and of the right type: a seal proves no more than wholeness."""
+    """True if all that is needed is there, and of the right type: a seal proves no more than wholeness."""
     if not {"estimate", "done", "key", "sensitivity"} <= content.keys():
         return False
     done, numbers = content["done"], [value for name, value in content.items() if name not in ("done", "key")]

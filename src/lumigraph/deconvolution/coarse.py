@@ -39,7 +39,7 @@ def warn_of_coarse_samples(run: Run, state: State) -> None:
             f"the object found leaves a deviance of {state.deviance:.3g} per pixel, where noise leaves "
             f"{noise:.2g}, and more iterations would leave {limit:.3g} or more: it does not explain the raw "
             f"image. Its samples are {picture.length(max(grid.pitch))} apart, the instrument resolves those "
-            f"of {picture.length(resolved)}. Ask its operator for more samples_per_lenslet, up to "
+            f"of {picture.length(resolved)}. Build its operator with more samples_per_lenslet, up to "
             f"{max(grid.pitch) / resolved:.2g} times as many. If that changes little, check depths, "
             "calibration, aberrations, gain and prior.",
             SamplingWarning,

@@ -1,4 +1,4 @@
-"""`deconvolve`: from a raw image to what was in front of the camera; `deconvolve_series` for many."""
+"""`deconvolve`: the object before the camera from a raw image; `deconvolve_series` for many."""
 
 import math
 import os
@@ -91,7 +91,7 @@ def deconvolve(
     progress: Report | None = None,
     checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
 ) -> Result:
-    """What was in front of the camera: intensities (y, x) or (z, y, x), at least 0.
+    """Object before the camera: intensities (y, x) or (z, y, x), at least 0.
 
     Where the operator can look beyond the picture (`beyond.Widening`), the object reaches as far as light
     comes from, and is cut to the operator's own afterwards: else its border would take up that light.
@@ -117,8 +117,8 @@ def deconvolve(
     progress
         Called with a `Step` after each iteration.
     checkpoint
-        A file (.npz) or `Checkpoint`: written now and then, and read at the start if it is there, so that a
-        killed run goes on and ends with the same result bit for bit.
+        A file (.npz) or `Checkpoint`: written now and then, and read at the start if it is there. Safe to
+        interrupt: the same call resumes, and ends with the same result bit for bit.
 
     Returns
     -------
@@ -202,8 +202,8 @@ def deconvolve_series(
         As in `deconvolve`; the exposure is that of the first frame for all of them, and a checkpoint keeps
         the frame that is being worked on.
     warm
-        Whether each frame begins with the result of the one before, which where little moves is as likely in
-        half of the iterations. The first frame begins as it does alone.
+        Whether each frame begins with the result of the one before, which reaches the same likelihood in half
+        the iterations where little moves. The first frame begins as it does alone.
     """
     engine = Deconvolver(operator, iterations, method=method, warm=warm)
     for raw in frames:
@@ -263,7 +263,7 @@ class Deconvolver:
         self, raw: RawImage | Array | Raws, exposure: Exposure | Sequence[Exposure] | None,
         progress: Report | None = None, checkpoint: Checkpoint | str | os.PathLike[str] | None = None,
     ) -> tuple[Run, RawImage | Array]:  # fmt: skip
-        """What is to be done, and what tells where the result stands."""
+        """Run of one raw image, or of several, and the image that gives the result its place."""
         like, raw, exposure = self._row(raw, self.known(raw, exposure))
         data = values(raw, self.operator, exposure)
         problem = Problem.of(raw, exposure, self._scaled(exposure, data))
@@ -326,7 +326,7 @@ class Deconvolver:
     def _row(
         self, raw: RawImage | Array | Raws, exposure: Exposure | tuple[Exposure, ...]
     ) -> tuple[RawImage | Array, RawImage | Array, Exposure]:
-        """What tells where the result stands, and one raw image and its exposure; several in a row."""
+        """Image that gives the result its place, and one raw image with its exposure; several in a row."""
         if isinstance(self.operator, Joint) and isinstance(exposure, tuple):
             raws = check_count(raw, self.operator)
             return raws[0], *together(raws, self.operator, exposure)

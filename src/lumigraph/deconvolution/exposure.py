@@ -1,4 +1,4 @@
-"""What is known of a raw image besides its values: offset, response, dead pixels, noise."""
+"""Exposure of a raw image: offset, response, dead pixels, noise."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +15,7 @@ from lumigraph.errors import CalibrationError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exposure:
-    r"""How a raw image r follows from the light A o on the pixels.
+    r"""Relation of a raw image r to the light A o on the pixels.
 
     .. math:: g\,(r - r_0) \sim \mathrm{Poisson}(g\,(t v \cdot A o + b - r_0)) + \mathcal N(0, \sigma^2)
 
@@ -27,7 +27,7 @@ class Exposure:
     background
         b: what a pixel reads without light, in the raw image's values: a number or (ny, nx).
     response
-        v: what a pixel makes of light over what the model expects (ny, nx); None for 1.
+        v: response of each pixel to light, over that of the model (ny, nx); None for 1.
     weights
         How much each pixel counts (ny, nx), from 0 to 1: 0 for dead or saturated ones, whose values are
         not read and may be NaN. None for 1.
@@ -81,7 +81,7 @@ class Exposure:
 
     @classmethod
     def of(cls, raw: RawImage, **known: Any) -> "Exposure":
-        """What `Sensor.expose` has recorded or `lumigraph.prepare` has found, and what else is `known`."""
+        """Exposure that `Sensor.expose` recorded or `lumigraph.prepare` found, and what else is `known`."""
         found: dict[str, Any] = {}
         if "full_well" in raw.metadata and raw.bit_depth is not None:
             told = {name: float(raw.metadata.get(name, 0.0)) for name in ("read_noise", "black_level")}

@@ -1,10 +1,9 @@
 r"""Low-pass filters of a step's factor, against the lattice's artefacts.
 
-Near the plane that the camera focuses on the lenslets, every point behind a lenslet sends the same light into
-it: finer structure is not in the raw image, and Richardson-Lucy fills it with squares of the lenslets' size.
-A low-pass of every step's factor, as wide as the lenslets sample that depth, lets in what was measured only.
-Filtering the estimate itself would leave the data badly explained, and planes without a filter would take up
-the light of those with one.
+Near the plane in focus every point behind a lenslet sends the same light into it: finer structure is not in
+the raw image, and Richardson-Lucy fills it with squares of the lenslets' size. A low-pass of every step's
+factor, as wide as the lenslets sample that depth, keeps what was measured. A filter of the estimate itself
+would leave the data badly explained, and planes without a filter would take up the light of those with one.
 
 A. Stefanoiu et al., "Artifact-free deconvolution in light field microscopy", Opt. Express 27, 31644 (2019).
 """

@@ -1,4 +1,4 @@
-"""What methods share: the state of an iteration, when to stop, and what may be added to them."""
+"""Common parts of all methods: the state of an iteration, stopping rules, priors and filters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from lumigraph.errors import GeometryError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """Where an iteration stands.
+    """State of an iteration.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class State:
 
     @classmethod
     def even(cls, problem: Problem) -> "State":
-        """That of the even object as bright as the data."""
+        """State of the even object that is as bright as the data."""
         flat, light = problem.flat(), problem.scale.even
         model = problem.model(flat) if light is None else problem.read(problem.level * light)
         return cls(flat, model, problem.deviance(model))
@@ -64,7 +64,7 @@ class Method(Protocol):
 
 
 class Prior(Protocol):
-    """What is expected of objects; draws an estimate towards it."""
+    """Prior knowledge of objects, towards which an estimate is drawn."""
 
     def shrink(self, problem: Problem, before: Array, state: State, /) -> tuple[Array, dict[str, Array]]:
         """The estimate, and what the prior wants to remember.
@@ -85,13 +85,13 @@ class Filter(Protocol):
     """Applied to the factor of each step, such as `LowPass`."""
 
     def __call__(self, factor: Array, /) -> Array:
-        """The factor (y, x) or (z, y, x) of the estimate, filtered."""
+        """Factor (y, x) or (z, y, x) of the estimate, filtered."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """When to stop.
+    """Rule by which a deconvolution stops.
 
     Richardson-Lucy fits the noise in the end: it is to be stopped before. Where the electrons are counted
     (`Exposure.gain`), the deviance per pixel of the true object is 1 on average (a little more at one or
@@ -127,7 +127,7 @@ class Stop:
                 checks.positive(name, value, "1")
 
     def reached(self, done: int, deviance: float, change: float) -> str:
-        """Why to stop here; empty to go on."""
+        """Reason to stop here; empty to continue."""
         if self.deviance is not None and deviance <= self.deviance:
             return f"deviance {deviance:.4g} per pixel is at most {self.deviance:g}"
         if self.change is not None and change < self.change:
@@ -136,7 +136,7 @@ class Stop:
 
 
 def check_offers(name: str, thing: Any, wanted: tuple[str, ...], remedy: str) -> None:
-    """Refuse what has not all of the wanted attributes, such as a camera where its operator is needed."""
+    """Refuse an object without all wanted attributes, such as a camera where its operator is needed."""
     if not all(hasattr(thing, attribute) for attribute in wanted):
         raise GeometryError(
             f"{name} is of type {type(thing).__name__} but must have {', '.join(wanted)}. {remedy}"

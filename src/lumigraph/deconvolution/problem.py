@@ -1,4 +1,4 @@
-"""A raw image, its camera and its noise, put together: what every method asks of them."""
+"""A raw image, its camera and its noise, put together for all methods."""
 
 from dataclasses import dataclass, replace
 
@@ -20,7 +20,7 @@ FAINT = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scale:
-    """What does not depend on the raw image, so that a time series needs it once.
+    """Quantities that do not depend on the raw image, so that a time series needs them once.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Scale:
 
     @classmethod
     def of(cls, operator: Linear, exposure: Exposure, like: Array, least: float = UNSEEN) -> "Scale":
-        """Of an operator, in the library and precision of an array; see `UNSEEN` for `least`."""
+        """Scale of an operator, in the library and precision of an array; see `UNSEEN` for `least`."""
         shape, xp = tuple(operator.shape[0]), arrays.namespace(like)
         response = pixels("response", exposure.response, shape, like)
         if exposure.light != 1:
@@ -106,7 +106,7 @@ class Scale:
 
     @property
     def mean_sensitivity(self) -> float:
-        """Of the object samples that are seen."""
+        """Mean sensitivity of the object samples that are seen."""
         xp, like = arrays.namespace(self.sensitivity), self.sensitivity.dtype
         seen = arrays.sum_by_part(lambda light: xp.astype(xp.isfinite(light), like), self.sensitivity)
         return self.light_of_even / seen
@@ -142,7 +142,7 @@ class Problem:
 
     @classmethod
     def of(cls, raw: RawImage | Array, exposure: Exposure, scale: Scale) -> "Problem":
-        """Of a raw image that `values` has accepted."""
+        """Problem of a raw image that `values` has accepted."""
         data = values(raw, scale.operator, exposure)
         xp = arrays.namespace(data)
         if scale.weights is not None:
@@ -174,7 +174,7 @@ class Problem:
 
     @property
     def light(self) -> np.ndarray:
-        """What the pixels tell of the light on them (ny, nx), at least 0; 0 where they do not count."""
+        """Light on the pixels by their values (ny, nx), at least 0; 0 where they do not count."""
         light = np.maximum(arrays.to_numpy(self.data) - arrays.to_numpy(self.scale.background), 0)
         if self.scale.response is None:
             return light
@@ -228,7 +228,7 @@ def values(raw: RawImage | Array, operator: Linear, exposure: Exposure) -> Array
 
 
 def pixels(name: str, plane: Array | None, shape: tuple[int, ...], like: Array) -> Array | None:
-    """What is known of each pixel in the library and precision of an array; None where nothing is."""
+    """Plane of values of each pixel, in the library and precision of an array; None where there is none."""
     if plane is None:
         return None
     if tuple(plane.shape) != shape:

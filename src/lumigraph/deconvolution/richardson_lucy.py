@@ -32,8 +32,8 @@ class RichardsonLucy:
         and light is not drawn from one plane to another. What it leaves below 0 becomes 0. A step that would
         fit the raw image worse by 2 % is taken without it.
     accelerated
-        Extrapolates each step by the last one (Biggs & Andrews), with as much likelihood in a third to a
-        tenth of the steps; where a plain step would be likelier it is taken instead.
+        Accelerated Richardson-Lucy: extrapolates each step by the last one (Biggs & Andrews), and reaches the
+        same likelihood in a third to a tenth of the steps; a plain step is taken where it is likelier.
     start
         First estimate (y, x) or (z, y, x); an even object if left out. What is 0 there stays 0.
 

@@ -23,7 +23,7 @@ Result = Array | Volume | RawImage
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """How a deconvolution goes on.
+    """Progress of a deconvolution.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Step:
     elapsed, remaining
         Time [s] so far, and still to go at the present pace.
     stopped
-        Why it stops before the last iteration; empty while it goes on.
+        Reason to stop before the last iteration; empty while it continues.
     """
 
     iteration: int
@@ -63,9 +63,9 @@ class Interrupted(KeyboardInterrupt):
 
 @dataclass(slots=True)
 class Run:
-    """A problem, a method and when to stop; `wanted` is the operator and what of the object is asked for.
+    """A problem, a method and when to stop; `wanted` are the operator and the part of the object to return.
 
-    `counted` says whether deviances are in electrons; `fall` is by how much the last step lowered it.
+    `counted` says whether deviances are in electrons; `fall` is the decrease of it in the last step.
     """
 
     problem: Problem
@@ -99,7 +99,7 @@ class Run:
             self.checkpoint.keep(self.problem, state, self.key, now=True)
 
     def result(self, state: State, raw: RawImage | Array) -> Result:
-        """What is asked for of the object, with its place in space."""
+        """Wanted part of the object, with its place in space."""
         operator, inside, pictured = self.wanted
         return _placed(cut(state.estimate, inside, pictured), raw, operator)
 

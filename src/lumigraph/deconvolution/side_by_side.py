@@ -1,7 +1,7 @@
-"""Several runs that share an operator: what they ask of it is answered by one product for all of them.
+"""Several runs that share an operator: one product answers the requests of all of them.
 
-Each run is a thread, and they take turns: one works until it asks for the operator. When all wait for it, it
-is applied to all that they ask for. So a method is written for one raw image, and knows nothing of others.
+Each run is a thread, and they take turns: one works until it needs the operator. When all wait for it, it is
+applied to all their arrays. So a method is written for one raw image, and knows nothing of others.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ Found = TypeVar("Found")
 
 @dataclass(slots=True)
 class _Question:
-    """An array that a run wants mapped, and what came of it."""
+    """An array that a run wants mapped, and its image."""
 
     back: bool
     array: Array
@@ -28,7 +28,7 @@ class _Question:
 
 @dataclass(slots=True)
 class _Table:
-    """Runs that have not ended, what some of them ask, and what ends them all."""
+    """Runs that have not ended, the requests of some of them, and the error that ends them all."""
 
     runs: int
     asked: list[_Question] = field(default_factory=list)
@@ -37,7 +37,7 @@ class _Table:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Meeting(Linear):
-    """An operator that waits until all runs ask for it.
+    """An operator that waits until all runs need it.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ class Meeting(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of the operator."""
+        """Shape of the operator."""
         return self.of.shape
 
     def attended(self, run: Callable[[Linear], Found]) -> Found:
-        """What a run gives, which applies this."""
+        """Result of a run that applies this."""
         with self._turn:
             try:
                 return run(self)
@@ -66,7 +66,7 @@ class Meeting(Linear):
                 self._answer()
 
     def dismiss(self, error: BaseException) -> None:
-        """End all runs by an error, at the latest the next time that they ask."""
+        """End all runs by an error, at the latest at their next request."""
         with self._turn:
             self._table.stop = error
             self._turn.notify_all()
@@ -87,7 +87,7 @@ class Meeting(Linear):
         return question.answer
 
     def _answer(self) -> None:
-        """Apply the operator, once all runs that have not ended ask for it."""
+        """Apply the operator, once all runs that have not ended need it."""
         questions = tuple(self._table.asked)
         if not questions or len(questions) < self._table.runs or self._table.stop is not None:
             return
@@ -105,7 +105,7 @@ class Meeting(Linear):
 
 
 def side_by_side(operator: Linear, runs: Sequence[Callable[[Linear], Found]]) -> list[Found | Exception]:
-    """What each run gives that is called with an operator, or the error that ended it.
+    """Result of each run that is called with an operator, or the error that ended it.
 
     At most ``operator.side_by_side`` of them.
     """

@@ -1,4 +1,4 @@
-r"""Several raw images of one object as one row of pixels, weighed as their noise asks.
+r"""Several raw images of one object as one row of pixels, weighted by their noise.
 
 Each is brought to electrons, in which photon noise is Poisson's whatever the gain: with the gain g and the
 light t of each raw image k, and the first one's gain :math:`g_0`,
@@ -71,7 +71,7 @@ def check_count(raws: object, operator: Joint) -> Raws:
 
 
 def exposures_of(raws: Raws, given: Exposure | Sequence[Exposure] | None) -> tuple[Exposure, ...]:
-    """What is known of each raw image: as given, one for all or one for each, or as recorded.
+    """Exposure of each raw image: as given, one for all or one for each, or as recorded.
 
     Raises
     ------
@@ -112,8 +112,8 @@ def together(raws: Raws, operator: Joint, exposures: Sequence[Exposure]) -> tupl
     unknown = [k for k, gain in enumerate(gains) if gain is None]
     if 0 < len(unknown) < len(gains):
         raise CalibrationError(
-            f"the gain of raw image {unknown[0]} is not known but that of others is: how much each counts "
-            "is open. Give Exposure(gain=...), electrons per value, for each, or for none."
+            f"the gain of raw image {unknown[0]} is not known but that of others is: their weights "
+            "are undetermined. Give Exposure(gain=...), electrons per value, for each, or for none."
         )
     first, rows = gains[0] or 1.0, []
     for raw, one, exposure in zip(raws, operator.maps, exposures, strict=True):
@@ -127,7 +127,7 @@ def together(raws: Raws, operator: Joint, exposures: Sequence[Exposure]) -> tupl
 
 
 def _row(data: Array, exposure: Exposure, first: float) -> tuple[Array, Array, Array, Array]:
-    """Of one raw image: data, response, background and weights (n,)."""
+    """Data, response, background and weights (n,) of one raw image."""
     xp, shape = arrays.namespace(data), tuple(data.shape)
     gain, zeros = exposure.gain or 1.0, xp.zeros_like(data)
     response = pixels("response", exposure.response, shape, data)

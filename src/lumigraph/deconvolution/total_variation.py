@@ -2,12 +2,8 @@ r"""Total variation: objects are even but for edges.
 
 .. math:: \min_{o \ge 0}\; \sum w\,[A o + b - r \ln(A o + b)] + \lambda \bar s \int |\nabla o|
 
-Each step is a step of Richardson-Lucy, then the total variation is lowered in the metric of that step:
-
-.. math:: \min_{o \ge 0}\; \tfrac12 \sum \frac{s}{o_k} (o - o_{k+1/2})^2 + \lambda \bar s \sum |\nabla o|
-
-whose fixed points are those of the multiplicative form o/(s - λ s̄ div(∇o/|∇o|)) of Dey et al., which takes
-∇o/|∇o| from the step before and can leave the positive numbers where λ is large.
+Each step is a step of Richardson-Lucy, then the total variation is lowered in the metric of that step. The
+steps, and the multiplicative form of Dey et al.: docs/theory/deconvolution.md.
 
 N. Dey et al., Microsc. Res. Tech. 69, 260 (2006); C. Brune, A. Sawatzky & M. Burger, Int. J. Comput. Vis. 92,
 211 (2011); the dual steps are those of A. Beck & M. Teboulle, IEEE Trans. Image Process. 18, 2419 (2009).

@@ -1,13 +1,9 @@
 r"""Wavelets: objects have few coefficients that are not noise.
 
 The noise of a Richardson-Lucy step grows as √o, that of √o is the same everywhere: coefficients of √o are
-drawn towards 0 by one threshold, and o stays positive because it is a square. In the metric s/o of the step
-this is the proximal map of
-
-.. math:: \lambda \sqrt{c} \sum |W \sqrt{o}|
-
-where c is the mean intensity. The picture is shifted before each transform by another number of samples
-(cycle spinning), without which the blocks of the wavelets show.
+drawn towards 0 by one threshold, and o stays positive because it is a square. The picture is shifted before
+each transform by another number of samples (cycle spinning), without which the blocks of the wavelets show.
+Proximal map: docs/theory/deconvolution.md.
 
 R. R. Coifman & D. L. Donoho, "Translation-invariant de-noising", Lecture Notes in Statistics 103, 125 (1995);
 F. J. Anscombe, Biometrika 35, 246 (1948).
@@ -92,7 +88,7 @@ class Wavelets:
         return back[margins].astype(values.dtype, copy=False)
 
     def _levels(self, n: int) -> int:
-        """Scales that fit into n samples, at most those asked for."""
+        """Number of scales that fit into n samples, at most the given one."""
         return min(self.levels, pywt.dwt_max_level(n, self.name))
 
     def _widened(self, values: np.ndarray) -> tuple[np.ndarray, tuple[slice, ...]]:

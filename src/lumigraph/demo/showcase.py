@@ -1,4 +1,4 @@
-"""From two camera files to a report that leads with the pictures."""
+"""Demonstration: two camera files become a report that leads with the pictures."""
 
 import os
 import time

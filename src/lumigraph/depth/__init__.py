@@ -1,22 +1,12 @@
 """Depth from a light field.
 
-- `quantities`: disparities as refocus factors; every estimate returns a `core.depth_map.DepthMap`
-- `epi`: disparities from the slopes of the lines of epipolar-plane images
-- `from_focus`: refocus factors from the sharpness of a focal stack; `point_alpha` for a picture of one
-  point, and `BiasCurve`, which corrects what diffraction does to either
-- `correlation`: patch sizes of a plenoptic 2.0 camera's lenslets, from neighbouring micro-images;
-  `dense`: of each sample of its picture, by `sightings`, what all micro-images show of it; `flat`: raw images
-  without the shading of micro-images; `of_pixels` is all of it, from a raw image to its picture's patches,
-  `of_lenslets` the same for lenslets
-- `bias`: `unbiased`, a map corrected by planes of known depth
-- `fuse`: several maps as one, smooth but for kinks and jumps
-- `metric`: distances through the camera's geometry: metres, virtual depths, points in space
-- `pictures`, `sweep`, `lines`: the steps of `epi`: even views, a plane sweep, least squares on all views;
-  `visible`: which views see a place; `vote`: which of two maps they agree with;
-  `shading`: how a place's brightness changes from view to view
-- `expected`: the error to expect; `chance`: matches no better than by chance; `repeats`: pictures that repeat
-- `volume`: costs of many labels: guided filter, semi-global matching, the best label
-- `smooth`: surfaces through uncertain values that may be slanted, bent and torn
+- `epi` (`pictures`, `sweep`, `lines`, `visible`, `vote`, `shading`): disparities by epipolar-plane images
+- `from_focus`: refocus factors by a focal stack; `BiasCurve` and `bias.unbiased` correct for diffraction
+- `correlation`, `dense`, `of_pixels` (`sightings`, `flat`): patch sizes of a plenoptic 2.0 camera
+- `fuse`: several maps as one; `metric`: metres, virtual depths, points in space
+- `quantities`: disparities as refocus factors; all estimates return a `core.depth_map.DepthMap`
+- `expected`, `chance`, `repeats`: the error to expect; chance matches; repeating textures
+- `volume`, `smooth`: costs of labels; surfaces through uncertain values
 """
 
 from lumigraph.core.depth_map import DepthMap

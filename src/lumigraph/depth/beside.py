@@ -14,7 +14,7 @@ Pair = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Beside:
-    """What does not depend on the patches of n places: k lenslets around each, by their distance.
+    """Lenslets around n places, k each by their distance, independent of the places' patches.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Beside:
 
     @classmethod
     def of(cls, away: Pair, center: Pair, kind: np.ndarray, usable: np.ndarray, reach: float) -> "Beside":
-        """Of lenslets (steps, n) in any order; places at `reach` and beyond [pitches] do not see them."""
+        """Neighbours from lenslets (steps, n) in any order; places at `reach` and beyond do not see them."""
         distance = np.where(usable, np.hypot(*away), np.float32(_BEYOND * reach))
         count = int((distance < reach).sum(0).max(initial=0))
         order = np.argsort(distance, axis=0)[: max(count, 1)]
@@ -51,7 +51,7 @@ class Beside:
         )
 
     def within(self, reach: float) -> "Beside":
-        """Those lenslets that some place has within a reach [pitches], one at least."""
+        """The lenslets that some place has within a reach [pitches], one at least."""
         count = max(1, int(np.searchsorted(self.distance.min(1), reach)))
         (ay, ax), (cy, cx) = self.away, self.center
         return Beside(
@@ -63,7 +63,7 @@ class Beside:
         )
 
     def disagreement(self, weight: np.ndarray, value: np.ndarray, most: float) -> np.ndarray:
-        """How much lenslets of a weight and value (k, n) differ (n,) from the nearest sharp one; to 2 `most`.
+        """Disagreement (n,) of lenslets of a weight and value (k, n) with the nearest sharp one; to 2 `most`.
 
         What stands before a place hides it from the lenslets on one side; so the better of the left and the
         right ones counts, and the better of the upper and the lower.

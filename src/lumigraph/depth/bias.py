@@ -22,7 +22,7 @@ def unbiased(
     farthest: float,
     progress: Progress,
 ) -> DepthMap:
-    """A map of refocus factors, corrected by what the same method makes of planes whose depth is known.
+    """Map of refocus factors, corrected by the same method's results on planes of known depth.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A raw image as blurred as lenslets of several kinds should show a place."""
+"""Copies of a raw image, blurred as lenslets of several kinds should show a place."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,10 +15,10 @@ _STEP = 0.02  # px: between the standard deviations that are kept
 
 @dataclass(frozen=True)
 class Blurred:
-    """The raw image (levels, y, x), blurred by 0, 1, 2 ... steps; of `focus` see `Sightings`.
+    """Raw image (levels, y, x), blurred by 0, 1, 2 ... steps; for `focus` see `Sightings`.
 
     A lenslet spreads a point over a disc as wide as the patch differs from that at which it is sharp. So
-    another patch is also told by micro-images that are not blurred as they should be.
+    another patch also shows in micro-images that are not blurred as they should be.
     """
 
     images: np.ndarray
@@ -28,7 +28,7 @@ class Blurred:
     def of(
         cls, image: np.ndarray, focus: np.ndarray | None, trusts: Sequence[tuple[float, np.ndarray]]
     ) -> "Blurred":
-        """As far as kinds of lenslets need it, of these patches [px] and weights (kinds,)."""
+        """Copies blurred as far as kinds of lenslets need it, for patches [px] and weights (kinds,)."""
         if focus is None:
             return cls(image[None], None)
         count = 1 + max(int(_levels(size, trust, focus).max()) for size, trust in trusts)
@@ -59,7 +59,7 @@ class Blurred:
 
 
 def _levels(size: float, trust: np.ndarray, focus: np.ndarray) -> np.ndarray:
-    """By how many steps each kind of lenslets (kinds,) is blurred more than it is, if patches have a size."""
+    """Number of steps by which each kind of lenslets (kinds,) is blurred further, at a patch size."""
     blur = _SIGMA * np.abs(size - focus)
     more = np.sqrt(np.maximum(blur[trust >= _COUNTS].max() ** 2 - blur**2, 0))
     return np.rint(more / _STEP).astype(np.int64)

@@ -14,7 +14,7 @@ _SELECTED = 7.0  # standard errors: far more than the likest of many places of n
 
 
 def by_chance(shared: np.ndarray, own: np.ndarray, noise: np.ndarray | float, count: float) -> np.ndarray:
-    """How likely (y, x) a map's match is one by chance, 0 to 1.
+    """Probability (y, x) that a map's match is one by chance, 0 to 1.
 
     What sees a place where it is shows its texture again, all but the noise; of noise it shows as much as the
     likest of many places does by chance; and of a texture that it does not see, nothing.
@@ -38,7 +38,7 @@ def by_chance(shared: np.ndarray, own: np.ndarray, noise: np.ndarray | float, co
 
 
 def slowly(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """What varies slowly over a picture (y, x), by places that are known: alike wherever a place lies."""
+    """Slow variation of a picture (y, x), by means of known places around each."""
     return box(picture * known, _SLOW) / np.maximum(box(known.astype(picture.dtype), _SLOW), 1e-6)
 
 

@@ -1,4 +1,4 @@
-"""Patch size of each plenoptic 2.0 lenslet, from how its micro-image agrees with its neighbours'."""
+"""Patch size of each plenoptic 2.0 lenslet, by correlation of neighbouring micro-images."""
 
 import warnings
 from dataclasses import dataclass
@@ -98,9 +98,9 @@ def correlation(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sign:
-    """How well sizes (n,) [px] of one sign explain the picture: overall, and (n, rows, cols) each lenslet.
+    """Scores of patch sizes (n,) [px] of one sign: overall, and (n, rows, cols) for each lenslet.
 
-    `ends` are the least and most size that was asked for [px].
+    `ends` are the least and the largest size that were given [px].
     """
 
     overall: float
@@ -109,7 +109,7 @@ class Sign:
     scores: np.ndarray
 
     def depth(self, data: Array) -> DepthMap:
-        """Of lenslets, in the type of the raw image's pixels."""
+        """Depth map of the lenslets, in the type of the raw image's pixels."""
         values, trust = _joined(self.scores, self.sizes)
         return DepthMap(like(np.clip(values, *self.ends), data), like(trust, data), "patch")
 
@@ -160,13 +160,13 @@ def _ranges(patches: tuple[float, float] | None, pitch: float) -> list[tuple[flo
 
 
 def _overall(scores: np.ndarray) -> float:
-    """How well the best sizes of a range explain the picture, and how much better than others do."""
+    """Score of a range of sizes: how well the best ones explain the picture, and better than the others."""
     best = scores.max(0)
     return float((2 * best - np.median(scores, axis=0)).mean())
 
 
 def _warn(taken: Sign, other: Sign) -> None:
-    """That the other sign explains the picture about as well as the one that is taken."""
+    """Warn that the other sign explains the picture about as well as the one that is taken."""
     (least, most), (low, high) = taken.ends, other.ends
     warnings.warn(
         f"patches from {low:.3g} to {high:.3g} px explain the picture about as well as those from "

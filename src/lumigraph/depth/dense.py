@@ -1,4 +1,4 @@
-"""Depth of each sample of a plenoptic 2.0 picture, by what all micro-images show that see it."""
+"""Depth of each sample of a plenoptic 2.0 picture, by all micro-images that show it."""
 
 import math
 import warnings
@@ -164,7 +164,7 @@ def _labels(sizes: np.ndarray, trust: np.ndarray, reach: float, pitch: float) ->
 
 
 def _beyond(found: np.ndarray, counts: np.ndarray, ends: np.ndarray, sizes: np.ndarray) -> bool:
-    """Whether more than a few of the places that count lie at the ends: then warns."""
+    """True, with a warning, if more than a few of the places that count lie at the ends."""
     low, high = ends[0] + _STEP / 2, ends[1] - _STEP / 2
     share = float((((found < low) | (found > high)) & counts).mean())
     if share > _BEYOND:
@@ -242,7 +242,7 @@ def _refined(
 def _evidence(
     sights: Sightings, asked: np.ndarray, maps: tuple[np.ndarray, np.ndarray], noise: float
 ) -> Evidence:
-    """What a map of moves (y, x), with its picture, rests on, by what lenslets still ask of it (6, y, x)."""
+    """Evidence for a map of moves (y, x), with its picture, by the pull of lenslets on it (6, y, x)."""
     pull, information, variance, disputed, shared, own = asked
     variance = np.maximum(box(variance, 2), noise**2)
     white = noise_of(sights.flat.image)
@@ -259,7 +259,7 @@ def _evidence(
 
 
 def _period(sights: Sightings, sizes: np.ndarray, noise: float) -> np.ndarray:
-    """By how much moves (y, x) could be off, and no lenslet would tell from none; see `repeats`."""
+    """Period (y, x) of moves that no lenslet distinguishes from none; see `repeats`."""
     calibration, flat = sights.calibration, sights.flat
     pitch = calibration.lattice.pitch
     least, most = (part * pitch for part in WIDEST)
@@ -277,5 +277,5 @@ def _asked(part: Sightings, rows: slice, sizes: np.ndarray, noise: float, slow: 
 
 
 def _joined(sights: Sightings, made: Callable[[Sightings, slice], np.ndarray]) -> np.ndarray:
-    """Something that is made of each band of rows (y, ...)."""
+    """Array joined from each band of rows (y, ...)."""
     return np.concatenate([made(part, rows) for rows, part in sights.bands])

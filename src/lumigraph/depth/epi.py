@@ -68,7 +68,7 @@ def epi(
     Warns
     -----
     SamplingWarning
-        Places lie beyond the disparities asked for, match no better than by chance, repeat, or are
+        Places lie beyond the given disparities, match no better than by chance, repeat, or are
         saturated; or light is negative.
 
     References
@@ -107,7 +107,7 @@ def epi(
 
 @dataclass(frozen=True, slots=True)
 class Searched:
-    """Where a map's values were looked for.
+    """Ranges in which a map's values were searched.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class Searched:
     farthest
         Most movement that a lens camera could show [px].
     period
-        By how much a place (y, x) could move, and no view would tell [px]; 0 where there is no such movement.
+        Movement (y, x) of a place that no view shows [px]; 0 where there is no such movement.
     """
 
     ends: tuple[float, float]
@@ -154,7 +154,7 @@ def lines_of(
 
 
 def _known(views: LightField) -> np.ndarray:
-    """Whether the middle view shows a place (t, s): where it is not valid, nothing can be said."""
+    """Mask (t, s) of places that the middle view shows: all others are unknown."""
     if views.valid is None:
         return np.ones(views.lenslets.shape, bool)
     v, u = (n // 2 for n in views.aperture.shape)
@@ -166,7 +166,7 @@ def _check_ends(found: np.ndarray, error: np.ndarray, given: tuple[float, float]
     share = float((beyond & (error < step)).mean())
     if share > _BEYOND:
         warnings.warn(
-            f"{share:.1%} of the places lie beyond the disparities asked for, {given[0]:g} to "
+            f"{share:.1%} of the places lie beyond the given disparities, {given[0]:g} to "
             f"{given[1]:g} px: theirs are those at the end of the search. Give a wider range, or none.",
             SamplingWarning,
             stacklevel=3,

@@ -1,4 +1,4 @@
-"""The error of a map to expect: what noise does, and what is at stake beside an edge of depth."""
+"""Expected error of a map: by noise, and by what is at stake beside an edge of depth."""
 
 from dataclasses import dataclass
 
@@ -46,14 +46,14 @@ _NOTHING, _UNKNOWN = 1e-9, 1e3  # of the most information; px, the deviation whe
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What a map rests on.
+    """Evidence for a map: noise, contrast, and rival values of each place.
 
     Parameters
     ----------
     deviation
         Standard deviation (y, x) of a place by itself, as `deviation` makes it.
     around
-        How far (y, x) known values scatter where a place is told by those around it only.
+        Scatter (y, x) of known values where a place follows from those around it only.
     disputed
         Part (y, x) of what sees a place that shows something else there.
     contrast
@@ -65,7 +65,7 @@ class Evidence:
     farthest
         Between the least and the greatest value that there may be, which matches by chance may have.
     period
-        By how much (y, x) a value may be off, and nothing would tell, as in textures that repeat.
+        Error (y, x) that nothing would show, as in textures that repeat.
     """
 
     deviation: np.ndarray
@@ -161,12 +161,12 @@ def expected(
 
 
 def uniform(evidence: Evidence) -> np.ndarray:
-    """Whether a place (y, x) and all around it are as bright, as where the picture is saturated or black."""
+    """Mask (y, x) of places as bright as all around them, as where the picture is saturated or black."""
     return maximum_filter(evidence.contrast, 3) < _EVEN
 
 
 def terms(values: np.ndarray, evidence: Evidence, *, slants: bool = True) -> dict[str, np.ndarray]:
-    """What an expected error is made of (y, x), each in the unit of the values.
+    """Terms of an expected error (y, x), by name, each in the unit of the values.
 
     A map is most often wrong beside something farther, which it takes for a part of what stands before it;
     the more so if no edge of the picture says where that ends. What is as much nearer on the other side is no
@@ -187,10 +187,10 @@ def terms(values: np.ndarray, evidence: Evidence, *, slants: bool = True) -> dic
 
 
 def _range(values: np.ndarray, width: int) -> np.ndarray:
-    """Between the nearest and the farthest in a window (y, x)."""
+    """Range (y, x) from the farthest to the nearest value in a window."""
     return maximum_filter(values, width) - minimum_filter(values, width)
 
 
 def _beyond_slant(values: np.ndarray, width: int) -> np.ndarray:
-    """How much farther what is farthest in a window is, than what is nearest in it is nearer (y, x)."""
+    """Distance (y, x) to the farthest value in a window, less that to the nearest."""
     return (values - minimum_filter(values, width)) - (maximum_filter(values, width) - values)

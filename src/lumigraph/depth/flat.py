@@ -46,7 +46,7 @@ class Flat:
 
         That shading stands still while details move from one micro-image to the next, and would pull patches
         to 0. Without a white image it is what all micro-images have in common. A white image that has been
-        divided out tells it, and how far all of a lenslet is lit.
+        divided out gives it, and how far all of a lenslet is lit.
         """
         image, divisor = grey(raw), raw.divisor if isinstance(raw, PreparedImage) else None
         shaded = image if divisor is None else divisor.astype(np.float32)

@@ -24,12 +24,12 @@ _FEWEST = 3  # a peak needs a neighbour on both sides
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BiasCurve:
-    """What a focal stack measures of objects whose refocus factor is known, and the way back.
+    """Calibration curve of refocus factors: measured by a focal stack, against the true ones.
 
     A lenslet blurs the directions that it sees by λ/p, as much as all of them where it is small. The oblique
     line of a defocused point is smeared, and the picture that is sharpest lies nearer to the lenslets'
     plane, α' = 1, than the point does. The blur is the same for every point of a camera, so that points
-    simulated at some depths tell what to make of any measured one.
+    simulated at some depths correct any measured one.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class BiasCurve:
 
 
 def sharpness(stack: Array) -> np.ndarray:
-    r"""How concentrated the light of each picture (n, t, s) of a focal stack is (n,) [1/lenslets²].
+    r"""Concentration of the light in each picture (n, t, s) of a focal stack (n,) [1/lenslets²].
 
     .. math:: S = \frac{\int E^2\, dx\, dy}{(\int E\, dx\, dy)^2}
 
@@ -148,7 +148,7 @@ def point_alpha(
 def from_focus(
     views: LightField, alphas: Alphas, *, window: float = 1.5, correction: BiasCurve | None = None
 ) -> DepthMap:
-    r"""Refocus factor of what each lenslet sees: where the stack has its highest local contrast.
+    r"""Refocus factor of each lenslet's place: where the stack has its highest local contrast.
 
     .. math:: C(x) = \frac{\langle E^2 \rangle - \langle E \rangle^2}{\langle E \rangle^2}
 
@@ -215,7 +215,7 @@ def _even(alphas: Alphas) -> np.ndarray:
 
 
 def _peaks(curves: np.ndarray, alphas: np.ndarray) -> np.ndarray:
-    """Where each curve (n, k) is highest: vertex of the parabola through the highest sample's neighbours."""
+    """Peak of each curve (n, k): vertex of the parabola through the highest sample's neighbours."""
     top = curves.argmax(0)
     middle = np.clip(top, 1, len(alphas) - 2)
     below, at, above = (np.take_along_axis(curves, (middle + k)[None], 0)[0] for k in (-1, 0, 1))

@@ -43,7 +43,7 @@ def refined(
     well. Two are both refined on some of the views; each place takes the one that the views agree with, and
     what is so joined is refined on all.
 
-    Each round asks every view that sees a place by how much it should move there, r = g Δ: the residual r
+    Each round computes by how much a place should move for every view that sees it, r = g Δ: the residual r
     against the middle view, and the gradient g along the view's own direction. The answers, weighted by what
     they say, are joined by a smooth surface.
     """
@@ -84,7 +84,7 @@ def _along(pictures: Pictures, step: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def _splines(grey: np.ndarray, lit: np.ndarray) -> np.ndarray:
-    """Of lit views (v, u, y, x), for `map_coordinates`."""
+    """Splines of lit views (v, u, y, x), for `map_coordinates`."""
     out = np.zeros_like(grey)
     for view in np.argwhere(lit):
         _spline(grey[tuple(view)], 3, output=out[tuple(view)])
@@ -112,7 +112,7 @@ class _Lines:
         return self.changed(moves, asked, jump), asked.shading
 
     def changed(self, moves: np.ndarray, asked: "_Asked", jump: float) -> np.ndarray:
-        """A map (y, x) moved by what views ask for."""
+        """Map (y, x) moved by the changes that views imply."""
         stiffness = _STIFFNESS * self.pictures.noise**2 * _lever(self.pictures)
         how = Stiffness(stiffness, _KINK, jump)
         change = update(moves, asked.information, asked.pull, how, self._edges, tears(moves, _TEAR)) - moves
@@ -120,9 +120,9 @@ class _Lines:
 
 
 def _evidence(lines: _Lines, asked: "_Asked", moves: np.ndarray, rivals: np.ndarray) -> Evidence:
-    """What a map (y, x) rests on, by what views still ask of it.
+    """Evidence for a map (y, x), by the pull of views on it.
 
-    Noise has gradients of its own, which say nothing.
+    Noise has gradients, too, which carry no information.
     """
     pictures, usual = lines.pictures, box(asked.information, _WINDOW)
     nothing = 0.25 * pictures.noise**2 * _lever(pictures)
@@ -139,14 +139,14 @@ def _evidence(lines: _Lines, asked: "_Asked", moves: np.ndarray, rivals: np.ndar
 
 
 def _lever(pictures: Pictures) -> float:
-    """Sum of the squares of the views' distances from the middle one, by which what a texture says grows."""
+    """Sum of the views' squared distances from the middle one, in proportion to a texture's information."""
     squares = np.square(pictures.down)[:, None] + np.square(pictures.right)
     return float(squares[pictures.lit].sum())
 
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """What the views pull at each place (y, x), their information about it, and the shading that is left.
+    """Pull of the views at each place (y, x), their information about it, and the shading that is left.
 
     `residual` is how much the views that see a place differ from the middle one, `disputed` the part of them
     that does by more than noise, and `shown` the mean of what they show.
@@ -191,7 +191,7 @@ def _asked(pictures: Pictures, lines: np.ndarray, moves: np.ndarray, shading: Sh
 def _warped(
     pictures: Pictures, lines: np.ndarray, moves: np.ndarray
 ) -> Iterator[tuple[tuple[float, float], np.ndarray, np.ndarray]]:
-    """For each view where it stands, which places (y, x) of the middle one it sees, and what there."""
+    """Each view's place, mask (y, x) of the middle view's places that it sees, and its values there."""
     places = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in moves.shape), indexing="ij")
     for v, u, seen in visible(pictures, moves):
         stands = float(pictures.down[v]), float(pictures.right[u])

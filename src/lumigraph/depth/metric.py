@@ -203,7 +203,7 @@ def cloud(
 def _places(
     source: LightField | Calibration, depth: DepthMap, grid: Grid | None
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Where the map's samples stand at the lenslets (y, x) [m], and how far that is behind the main lens."""
+    """Places (y, x) of the map's samples at the lenslets [m], and their distance behind the main lens."""
     if isinstance(source, LightField) or grid is not None:
         places = source.lenslets if isinstance(source, LightField) else grid
         assert places is not None

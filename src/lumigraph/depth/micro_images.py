@@ -1,4 +1,4 @@
-"""How well micro-images of a plenoptic 2.0 picture agree with their neighbours at each patch size."""
+"""Agreement of micro-images of a plenoptic 2.0 picture with their neighbours at each patch size."""
 
 import math
 from collections.abc import Iterator
@@ -46,13 +46,13 @@ class MicroImages:
 
     @classmethod
     def of(cls, raw: RawImage, calibration: Calibration) -> "MicroImages":
-        """Those of all whole lenslets. Raises LumigraphError if they would not fit in memory."""
+        """Micro-images of all whole lenslets. Raises LumigraphError if they would not fit in memory."""
         image = grey(raw)
         return cls.read(gaussian_filter(image, 0.5), calibration, lit_radius(image, calibration))
 
     @classmethod
     def read(cls, image: np.ndarray, calibration: Calibration, radius: float) -> "MicroImages":
-        """Those of an image (y, x), which count up to a radius [px]."""
+        """Micro-images of an image (y, x), which count up to a radius [px]."""
         indices = lenslet_indices(calibration)
         half = int(calibration.lattice.pitch / 2)
         size = (2 * half + 1) ** 2
@@ -74,7 +74,7 @@ class MicroImages:
 
     @property
     def radius(self) -> float:
-        """To which their pixels count [px]."""
+        """Radius to which pixels count [px]."""
         return math.sqrt(float(self.inside.sum()) / math.pi)
 
     def differences(self, moves: np.ndarray) -> np.ndarray:
@@ -113,7 +113,7 @@ class MicroImages:
         return out.reshape(-1, *self.indices.shape[:2])
 
     def _readings(self, way: tuple[int, int], sizes: np.ndarray) -> "dict[int, Reading]":
-        """How a neighbour is read for each size at which enough of it is shared, by the size's number."""
+        """Readings of a neighbour, by number, for each size at which enough of it is shared."""
         read = {k: Reading.of(self.inside, self._vector(way) * size) for k, size in enumerate(sizes)}
         return {k: reading for k, reading in read.items() if reading is not None}
 
@@ -124,7 +124,7 @@ class MicroImages:
         return [way for way in near if math.hypot(*self._vector(way)) < _REACH]
 
     def _vector(self, way: tuple[int, int]) -> np.ndarray:
-        """To a neighbour (y, x), in pitches."""
+        """Vector (y, x) to a neighbour, in pitches."""
         return self.calibration.lattice.matrix @ way / self.calibration.lattice.pitch
 
     def _neighbour(self, way: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
@@ -160,7 +160,7 @@ class Reading:
 
     @classmethod
     def of(cls, inside: np.ndarray, move: np.ndarray) -> "Reading | None":
-        """That of a move (dy, dx) [px]; None where too little of the pixels inside (h, w) is shared."""
+        """Reading for a move (dy, dx) [px]; None where too little of the pixels inside (h, w) is shared."""
         lines = [_line(count, float(part)) for count, part in zip(inside.shape, move, strict=True)]
         weight = (inside * (lines[0] @ inside @ lines[1].T)).ravel()
         if weight.sum() < _LEAST_SEEN * inside.sum():
@@ -190,7 +190,7 @@ def _blocks(count: int) -> Iterator[slice]:
 
 
 def _line(count: int, move: float) -> np.ndarray:
-    """From values (count,) to those at places moved by a distance, read linearly; 0 beyond the ends."""
+    """Matrix (count, count) from values to those at places moved by a distance, linearly; 0 beyond."""
     below = math.floor(move)
     part = move - below
     weights = (1 - part) * np.eye(count, k=below) + part * np.eye(count, k=below + 1)
@@ -198,7 +198,7 @@ def _line(count: int, move: float) -> np.ndarray:
 
 
 def _taps(places: np.ndarray, shape: tuple[int, ...], move: np.ndarray) -> csr_array:
-    """From pixels (height * width) of a shape to values at numbered places (n,), moved, read linearly."""
+    """Matrix from pixels (height * width) of a shape to values at numbered places (n,), moved, linearly."""
     below = np.floor(move).astype(int)
     y, x = (np.array([1 - part, part]) for part in move - below)
     steps = np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) + below

@@ -17,7 +17,7 @@ _LENSLETS = 0.3  # of the time
 
 
 class PixelDepth(NamedTuple):
-    """What `of_pixels` has found.
+    """Result of `of_pixels`.
 
     Parameters
     ----------

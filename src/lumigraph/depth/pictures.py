@@ -1,4 +1,4 @@
-"""The views of a light field as depth estimation needs them: few, even, and on a common scale."""
+"""Views of a light field for depth estimation: few, even, and on a common scale."""
 
 import math
 import warnings
@@ -20,7 +20,7 @@ MOST_VIEWS = 9
 """Along one axis: views between these look much the same, and cost as much."""
 
 LEAST_NOISE = 2e-3
-"""Of a picture from 0 to 1: what rounding to eight bits leaves."""
+"""Least noise of a picture from 0 to 1: that of rounding to eight bits."""
 
 FEWEST_VIEWS, LEAST_SIDE = 2, 8
 """Along one axis, and lenslets across a view: fewer show no lines."""
@@ -35,7 +35,7 @@ _DARK = 0.05  # views darker than this part of the middle one lie outside the ap
 
 
 def measurable(views: LightField) -> bool:
-    """Whether a light field has the two views of 8 x 8 lenslets or more that `epi` needs."""
+    """True if a light field has the two views of 8 x 8 lenslets or more that `epi` needs."""
     return min(views.lenslets.shape) >= LEAST_SIDE and max(views.aperture.shape) >= FEWEST_VIEWS
 
 
@@ -82,7 +82,7 @@ class Pictures:
         return self.data[self.middle]
 
     def sees(self, view: tuple[int, int], at: Sequence[np.ndarray]) -> np.ndarray:
-        """Whether a view shows places (...) of its own, along y and x: within it, and not cut off."""
+        """Mask of places (...), along y and x, that a view shows: within it, and not cut off."""
         ends = [n - 1 for n in self.data.shape[-2:]]
         inside = (at[0] >= 0) & (at[0] <= ends[0]) & (at[1] >= 0) & (at[1] <= ends[1])
         if self.seen is None:
@@ -92,7 +92,7 @@ class Pictures:
 
     @classmethod
     def of(cls, views: LightField) -> "Pictures":
-        """At most `MOST_VIEWS` squared views of a light field, evenly chosen about the middle one.
+        """Pictures of at most `MOST_VIEWS` squared views of a light field, evenly chosen about the middle.
 
         Raises
         ------
@@ -186,7 +186,7 @@ def noise_of(picture: np.ndarray) -> float:
 
 
 def noise_near(picture: np.ndarray) -> np.ndarray:
-    """The same of each block of a picture, at its places (y, x)."""
+    """Noise of each block of a picture, at its places (y, x)."""
     rough, out = _rough(picture), np.empty_like(picture)
     for start in np.ndindex(*(max(n // _NEAR, 1) for n in picture.shape)):
         ends = [

@@ -1,4 +1,4 @@
-"""Disparities as refocus factors, and back: the pitches of views tell."""
+"""Conversion of disparities to refocus factors, and back, by the pitches of views."""
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.depth_map import DepthMap

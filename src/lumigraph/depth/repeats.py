@@ -1,4 +1,4 @@
-"""Pictures that repeat: by how much a place could be off, and nobody would see it."""
+"""Repeating textures: the errors of a place that would remain unseen."""
 
 import math
 
@@ -18,7 +18,7 @@ _TEXTURE = 1.0  # variance of the texture over that of the noise: below, all pla
 
 
 def repeats(pictures: Pictures, farthest: float) -> np.ndarray:
-    """The least movement (y, x) [px in the outermost view] that no view of the cross can tell from none.
+    """The least movement (y, x) [px in the outermost view] that no view of the cross distinguishes from none.
 
     0 where there is none up to `farthest`. The middle view is compared with itself, moved as each view would
     see it: as different as noise makes it, after it has looked different for less.
@@ -61,7 +61,7 @@ def first_alike(left: np.ndarray, moves: np.ndarray, variance: np.ndarray, noise
 
 
 def _arms(pictures: Pictures) -> tuple[np.ndarray, np.ndarray]:
-    """How far from the middle view the others of the cross stand, along y and x, of the outermost."""
+    """Distances of the cross's views from the middle one, along y and x, over the outermost's."""
     v, u = pictures.middle
     down, right = pictures.down[pictures.lit[:, u]], pictures.right[pictures.lit[v]]
     return np.abs(down[down != 0]), np.abs(right[right != 0])
@@ -88,7 +88,7 @@ def _differences(picture: np.ndarray, axis: int, noise: float, most: float) -> n
 
 
 def of_micro_images(micro: MicroImages, farthest: float, noise: float) -> np.ndarray:
-    """The least change (rows, cols) of patches [px] up to `farthest` that no neighbour tells from none.
+    """The least change (rows, cols) of patches [px] up to `farthest` that no neighbour shows.
 
     0 where there is none. Micro-images are compared with themselves, moved as their neighbours would show
     them if the patch were larger: those of all others follow, which stand at sums of these steps.

@@ -1,4 +1,4 @@
-"""How the brightness of a place changes from view to view: gloss, and lamps that are out of focus.
+"""Changes of a place's brightness from view to view: gloss, and lamps that are out of focus.
 
 No surface is quite matt. Over a range of views the change is nearly linear in where the view stands, and it
 varies slowly over the picture, as texture does not: a part of a hundredth, which moves nothing where texture
@@ -28,7 +28,7 @@ class Shading:
     right: np.ndarray
 
     def at(self, down: float, right: float) -> np.ndarray:
-        """What a view standing there sees brighter (y, x)."""
+        """Additional brightness (y, x) in a view that stands there."""
         return np.float32(down) * self.down + np.float32(right) * self.right
 
     @classmethod

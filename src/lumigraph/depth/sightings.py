@@ -1,4 +1,4 @@
-"""What the micro-images around each place of a plenoptic 2.0 picture show of it, if its patch has a size."""
+"""Values that the micro-images around a place of a plenoptic 2.0 picture show, for a patch size."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -24,7 +24,7 @@ _BAND, _BLOCK = 1 << 15, 32  # samples at a time, and across: so that they stay 
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """What one neighbour of the nearest lenslet shows of each place (y, x).
+    """View of each place (y, x) by one neighbour of the nearest lenslet.
 
     `away` is from the lenslet to the place, along y and x [px of the lattice]. `weight` is 0 where it is not
     seen, and less for a kind of lenslet that blurs it. `here` numbers the places (n,) within its reach, row
@@ -88,7 +88,7 @@ class Sightings:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Of the picture."""
+        """Shape of the picture (rows, columns)."""
         return len(self.layout.y), len(self.layout.x)
 
     @cached_property
@@ -101,28 +101,28 @@ class Sightings:
 
     @cached_property
     def index(self) -> Pair:
-        """Of the lenslet nearest to each place."""
+        """Index (i, j) of the lenslet nearest to each place."""
         return self.calibration.lattice.index(self.layout.y[:, None], self.layout.x)
 
     @cached_property
     def _kinds(self) -> np.ndarray:
-        """Of the lenslets nearest to each place (n,)."""
+        """Kinds of the lenslets nearest to each place (n,)."""
         return self.calibration.lattice.kind(*self.index).astype(np.int8).ravel()
 
     @cached_property
     def _nearest(self) -> Pair:
-        """From the nearest lenslet to each place [px]."""
+        """Vector from the nearest lenslet to each place, along y and x [px]."""
         y, x = (middle.astype(np.float32).reshape(self.shape) for middle in self._middles)
         return np.float32(self.layout.y[:, None]) - y, np.float32(self.layout.x) - x
 
     @cached_property
     def _middles(self) -> Pair:
-        """Of the lenslets nearest to each place (n,), in a regular lattice, along y and x [px]."""
+        """Middles of the lenslets nearest to each place (n,), in a regular lattice, along y and x [px]."""
         points = self.calibration.lattice.position(np.stack(self.index, -1))
         return points[..., 0].ravel(), points[..., 1].ravel()
 
     def _centers(self, here: np.ndarray, step: tuple[int, int]) -> Pair:
-        """Of the micro-images that stand a step away from the nearest one of numbered places (n,) [px]."""
+        """Centres of the micro-images a step away from the nearest one of numbered places (n,) [px]."""
         move, warp = self.calibration.lattice.matrix @ step, self.calibration.warp
         y, x = (middle[here] + part for middle, part in zip(self._middles, move, strict=True))
         if warp is not None:
@@ -130,7 +130,7 @@ class Sightings:
         return y.astype(np.float32), x.astype(np.float32)
 
     def disagreements(self, sizes: np.ndarray, most: float, blurred: Blurred) -> np.ndarray:
-        """How much lenslets differ (n, y, x) if all patches have one of `sizes` (n,); see `Beside`."""
+        """Disagreement (n, y, x) of lenslets if all patches have one of `sizes` (n,); see `Beside`."""
         pitch, even = self.calibration.lattice.pitch, self.flat.even
         beside = self._beside(float(np.abs(sizes).min()))
         steps = np.arange(math.ceil(_FINE * (even + 1))).astype(np.float32) / np.float32(_FINE)
@@ -167,7 +167,7 @@ class Sightings:
         return Beside.of((away[0], away[1]), (cy, cx), kind, whole, self.flat.even / size)
 
     def around(self, size: np.ndarray | float, *, finer: bool = False) -> Iterator[Sight]:
-        """What each lenslet near a place shows of it if its patch has a size, one or (y, x) [px].
+        """Sights of each place by the lenslets near it, for a patch size, one or (y, x) [px].
 
         Of the raw image, or of the finer one.
         """
@@ -228,7 +228,7 @@ class Sightings:
         return total / weights
 
     def asked(self, size: np.ndarray, noise: float, slow: np.ndarray) -> np.ndarray:
-        """What lenslets pull at patches (y, x), and what that rests on (6, y, x).
+        """Changes of patches (y, x) that lenslets imply, and the evidence for them (6, y, x).
 
         Pull and information are for a step of the patch by which a detail moves by 1 px where it stands at a
         micro-image's edge; then the variance of the values, and the disputed part: values that are off by
@@ -252,7 +252,7 @@ class Sightings:
         return np.stack([pull, information, variance, disputed, *_shared(seen, values - slow)])
 
     def _slope(self, sight: Sight) -> np.ndarray:
-        """How much a lenslet's value changes with the logarithm of the patch, over patch/pitch (y, x)."""
+        """Derivative (y, x) of a lenslet's value by the logarithm of the patch, over patch/pitch."""
         image, slope = self.flat.finer, np.zeros(len(sight.here), np.float32)
         for axis, away in enumerate(sight.away):
             ends = []

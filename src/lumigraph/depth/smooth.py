@@ -19,12 +19,12 @@ _ENOUGH = 1e-10
 
 
 Tears = tuple[np.ndarray, np.ndarray]
-"""Whether there is a tear between each sample (y, x) and the next, along y and along x."""
+"""Masks of tears between each sample (y, x) and the next, along y and along x."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stiffness:
-    """How smooth a map is held.
+    """Stiffness of a smoothed map.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def update(
     information
         Inverse variance of each place, up to a factor; 0 where the data say nothing.
     pull
-        Information times the change that the data ask for.
+        Information times the change that the data imply.
     how
         Of the smoothness.
     edges
@@ -87,7 +87,7 @@ def update(
 
 
 def tears(values: np.ndarray, least: float) -> Tears:
-    """Where neighbours of a map (y, x) differ by more than `least`."""
+    """Masks (y, x), down and right, of edges at which neighbours of a map differ by more than `least`."""
     down, right = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
     down[:-1] = np.abs(np.diff(values, axis=0)) > least
     right[:, :-1] = np.abs(np.diff(values, axis=1)) > least
@@ -95,9 +95,9 @@ def tears(values: np.ndarray, least: float) -> Tears:
 
 
 def _torn(down: np.ndarray, right: np.ndarray, size: int) -> tuple[np.ndarray | int, Tears]:
-    """Which blocks of size² samples are of one piece, and the tears between them.
+    """Mask of blocks of size² samples that are of one piece, and the tears between them.
 
-    The mean of a torn block is nobody's: it says nothing, and no block bends towards it.
+    The mean of a torn block belongs to neither side: it has no weight, and no block bends towards it.
     """
     if size == 1:
         return 1, (down, right)
@@ -106,7 +106,7 @@ def _torn(down: np.ndarray, right: np.ndarray, size: int) -> tuple[np.ndarray | 
 
 
 def _across(cut: Tears) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the second differences of `_bends` cross no tear."""
+    """Masks (y, x) of the second differences of `_bends` that cross no tear."""
     down, right, both = (np.ones(cut[0].shape, bool) for _ in range(3))
     down[1:-1] = ~(cut[0][:-2] | cut[0][1:-1])
     right[:, 1:-1] = ~(cut[1][:, :-2] | cut[1][:, 1:-1])

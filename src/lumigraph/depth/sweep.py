@@ -1,4 +1,4 @@
-"""Plane sweep: how well the views agree when a place is taken to lie at each of many disparities.
+"""Plane sweep: agreement of the views if a place lies at each of many disparities.
 
 Only the cross of views through the middle one is used: each is moved along one axis only. What stands before
 a place hides it from the views of one side; so the better of the left and the right half counts, and the
@@ -138,7 +138,7 @@ class _View:
     seen: np.ndarray | None
 
     def difference(self, move: float, rows: slice, out: np.ndarray) -> np.ndarray:
-        """From rows of the middle view (c, y, x) if all places move by `move`, linearly between samples."""
+        """Difference from rows of the middle view (c, y, x) if all places move by `move`, linearly."""
         below = math.floor(move * self.place)
         part = np.float32(move * self.place - below)
         np.multiply(self._read(self.slope, below, rows), part, out=out)
@@ -147,7 +147,7 @@ class _View:
         return np.abs(out, out=out)
 
     def sees(self, move: float, rows: slice) -> np.ndarray | None:
-        """Which places (y, x) of some rows are not cut off if all move by `move`; None for all."""
+        """Mask (y, x) of places of some rows that are not cut off if all move by `move`; None for all."""
         if self.seen is None:
             return None
         below = math.floor(move * self.place)
@@ -176,7 +176,7 @@ class _View:
 
 
 def _halves(pictures: Pictures, shading: Shading, pad: int) -> list[list[list[_View]]]:
-    """For each axis the views on its two sides."""
+    """Views on both sides of the middle, for each axis."""
     v, u = pictures.middle
     arms = [
         [
@@ -273,7 +273,7 @@ def _textures(pictures: Pictures) -> Pictures:
 
 
 def _shading(pictures: Pictures, moves: np.ndarray, radius: int, most: float) -> Shading:
-    """What the cross of views sees brighter or darker than the middle one, places moved by `moves`."""
+    """Shading of the cross of views against the middle one, with places moved by `moves`."""
     fit = Fit(moves.shape, pictures.noise)
     grey, (v, u) = pictures.data.mean(2), pictures.middle
     slope = np.gradient(grey[v, u])

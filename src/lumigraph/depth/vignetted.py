@@ -1,4 +1,4 @@
-"""Views that vignette: where light is cut off on its way to each, and how bright they are elsewhere."""
+"""Vignetted views: the places where their light is cut off, and their brightness elsewhere."""
 
 import math
 
@@ -19,7 +19,7 @@ _BESIDE = 2  # px beside what is cut off: light falls off there
 
 
 def even(data: np.ndarray, lit: np.ndarray, middle: tuple[int, int]) -> np.ndarray | None:
-    """Which places (v, u, y, x) views see, where they vignette: there they are made even, in place.
+    """Mask (v, u, y, x) of places that vignetted views see; there they are made even, in place.
 
     Each becomes as bright as the middle one, and shows what that does where it is cut off. None, and nothing
     is changed, where no view's brightness beside the middle one's varies over the picture by more than
@@ -51,18 +51,18 @@ def _radius(shape: tuple[int, ...]) -> int:
 
 
 def _brightness(picture: np.ndarray) -> np.ndarray:
-    """Of a picture (c, y, x), over a window (y, x), a little more of it everywhere."""
+    """Brightness of a picture (c, y, x) over a window (y, x), with a small pedestal."""
     return box(picture.mean(0), _radius(picture.shape)) + np.float32(_PEDESTAL)
 
 
 def _varies(picture: np.ndarray, usual: np.ndarray) -> bool:
-    """Whether the brightness of a picture (c, y, x) over another's (y, x) does."""
+    """True if the brightness of a picture (c, y, x) over another's (y, x) varies."""
     low, high = np.percentile((_brightness(picture) / usual)[::4, ::4], (5, 95))
     return bool(high > math.sqrt(_VIGNETTED) * low)
 
 
 def _seen(data: np.ndarray, views: list[tuple[int, int]]) -> np.ndarray:
-    """Which places (v, u, y, x) are not cut off: what is black in a view where others are lit.
+    """Mask (v, u, y, x) of places that are not cut off: a cut-off place is black where others are lit.
 
     Black things are black in all views, and move little within a window; so does what stands before a dark
     ground.
@@ -80,7 +80,7 @@ def _seen(data: np.ndarray, views: list[tuple[int, int]]) -> np.ndarray:
 
 
 def _sum(image: np.ndarray, radius: int) -> np.ndarray:
-    """Over (2 radius + 1)² samples, 0 beyond the edges, as a part of them all."""
+    """Sum over (2 radius + 1)² samples, 0 beyond the edges, as a part of them all."""
     return uniform_filter(image, 2 * radius + 1, mode="constant")
 
 

@@ -1,4 +1,4 @@
-"""Which views see a place, and which do not because something nearer is in the way."""
+"""Visibility of places in views, behind what is nearer."""
 
 from collections.abc import Iterator
 
@@ -7,11 +7,11 @@ import numpy as np
 from lumigraph.depth.pictures import Pictures
 
 BEFORE = 1.2
-"""How much nearer an occluder is [px in the outermost view]."""
+"""Least distance of an occluder before a place [px in the outermost view]."""
 
 
 def visible(pictures: Pictures, moves: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
-    """For each lit view (v, u) but the middle one, which places (y, x) of the middle view it sees.
+    """Lit views (v, u) but the middle one, each with a mask (y, x) of the middle view's places it sees.
 
     Places are put into the view from far to near: where another one ends up on top, they are hidden.
     """

@@ -109,7 +109,7 @@ _VALLEY = 0.1  # of a jump on each path: what a rival's cost must fall below tha
 
 
 def rivals(total: np.ndarray, jump: float) -> np.ndarray:
-    """How far (y, x) a label may be off because others explain a place as well, in steps.
+    """Possible error (y, x) of a label, in steps, by other labels that explain a place as well.
 
     Every other valley of the costs counts by its distance, times the square of how deep it is beside the
     valley of the best label. Textures that repeat have such valleys, and so do places beside an edge of

@@ -1,4 +1,4 @@
-"""Which of two maps the views agree with, place by place."""
+"""Choice between two maps, place by place, by the views' agreement."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ _MOST = 0.1  # of a picture from 0 to 1: more says only that a place is wrong
 
 
 def agreed(pictures: Pictures, maps: tuple[np.ndarray, np.ndarray], shading: Shading) -> np.ndarray:
-    """Whether (y, x) the second of two maps of movements (y, x) [px in the outermost view] fits better.
+    """Mask (y, x) of places where the second of two maps of movements [px in the outermost view] fits better.
 
     Fits: the views of the cross that see the place, each moved by the map, differ less from the middle view
     and its shading, over a window.

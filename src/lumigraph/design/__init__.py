@@ -2,8 +2,7 @@
 
 - `thin_lens`: object and image distances, magnification
 - `resolution`: f-number, numerical aperture, cut-offs, Airy pattern, depth of field
-- `plenoptic1`: the plenoptic camera 1.0, lenslets at the main-lens image
-- `plenoptic2`: the focused plenoptic camera 2.0, lenslets relay the main-lens image
+- `plenoptic1`, `plenoptic2`: cameras with lenslets at the main-lens image; focused ones, that relay it
 - `microscope`: the light-field microscope, by depth
 - `layout`: the lengths that a ray diagram shows
 

@@ -1,4 +1,4 @@
-"""What a ray diagram shows of a camera: plain lengths, for `lumigraph.plots.layout`."""
+"""Lengths of a camera's ray diagram, for `lumigraph.plots.layout`."""
 
 from dataclasses import dataclass
 
@@ -33,7 +33,7 @@ class LensletLayout:
         return round((height - self.offset) / self.pitch)
 
     def focal_length(self, number: int) -> float:
-        """Of a lenslet, counted from the middle one [m]."""
+        """Focal length of a lenslet, counted from the middle one [m]."""
         return self.focal_lengths[number % len(self.focal_lengths)]
 
 
@@ -138,4 +138,4 @@ class MicroscopeLayout:
 
 
 _FAR = 1e3
-"""From the native image to a pupil whose rays count as parallel to the axis [m]."""
+"""Distance from the native image to a pupil whose rays count as parallel to the axis [m]."""

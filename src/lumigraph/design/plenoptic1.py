@@ -168,7 +168,7 @@ def defocus(focal_length: float, object_distance: float, refocus_factor: float) 
     Raises
     ------
     GeometryError
-        The factor asks for an image inside the focal length, beyond objects at infinity.
+        The factor implies an image inside the focal length, beyond objects at infinity.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What diffraction leaves: f-number, numerical aperture, cut-off frequencies, Airy pattern, depth of field.
+"""Limits by diffraction: f-number, numerical aperture, cut-off frequencies, Airy pattern, depth of field.
 
 The f-number is the working one, distance over diameter, of the side on which lengths are measured: with
 z2/D results hold in the image, with z1/D in the object.

@@ -1,4 +1,4 @@
-"""What light passes between planes: every element is a function from `Field` to `Field`.
+"""Optical elements that light passes between planes: functions from `Field` to `Field`.
 
 - `train`: `Element`, the protocol, and `Train`, elements one after the other
 - `transmission`: what thin elements share: a cached factor for each sample
@@ -7,10 +7,10 @@
 - `lenslets`: `LensletArray`, square or hexagonal, of one or three focal lengths
 - `scatter`: `Scatter`, how lenslets of an array differ from each other; `form`, terms of their form
 - `surface`: `Surface`, the curved side of lenslets of glass
-- `lean`: `Lean`, by how much arrays and sensors lean
+- `lean`: `Lean`, tilt and bow of arrays and sensors
 - `zernike`: Zernike polynomials in Noll's order and `ZernikePlate`
 - `field_plate`: Zernike terms that change over the field, and their plate
-- `objective`: `Objective`, a microscope's, as points before it see it; `disc`, nodes of its pupil
+- `objective`: `Objective`, a microscope's, for points before it; `disc`, nodes of its pupil
 - `masks`: white random phases and the thesis' random phase mask
 """
 

@@ -16,7 +16,7 @@ from lumigraph.elements.zernike import ZernikePlate, noll_to_nm
 from lumigraph.errors import GeometryError
 
 SLACK = 1e-6
-"""How far beyond the last field light may come from, as a part of it: rounding."""
+"""Part of the last field by which light may come from beyond it: rounding."""
 
 NONE = 1e-6
 """Waves rms that are none."""
@@ -29,7 +29,7 @@ class ZernikeMap:
     """Zernike terms of a lens over the field and, where they are known, over wavelengths.
 
     Between the given fields and wavelengths terms follow splines through them, cubic where there are four or
-    more. Of a round lens a line of fields tells all: fields in other directions have its terms turned.
+    more. A line of fields suffices for a round lens: fields in other directions have its terms turned.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class ZernikeMap:
     wavelengths
         Ascending [m]; None where terms are the same for all.
     metres
-        Whether coefficients are metres of path: waves of others at other wavelengths.
+        True if coefficients are metres of path: waves of others at other wavelengths.
 
     Raises
     ------
@@ -180,7 +180,7 @@ class ZernikeMap:
 
     @property
     def _parity(self) -> np.ndarray | None:
-        """Of terms over the axis of a round lens; None where fields lie on both sides."""
+        """Signs of the terms on the other side of a round lens' axis; None if fields lie on both sides."""
         return None if self.y is not None else np.array([(-1) ** (noll_to_nm(j)[1] % 2) for j in self.terms])
 
 
@@ -190,7 +190,7 @@ def _beyond(value: np.ndarray, nodes: Nodes) -> np.ndarray:
 
 
 def _through(nodes: Nodes, values: np.ndarray, at: float, parity: np.ndarray | None) -> np.ndarray:
-    """Values (n, ...) at nodes, for a place between them; a parity tells those on the axis' other side."""
+    """Values (n, ...) at nodes, for a place between them; a parity gives those on the axis' other side."""
     where = np.asarray(nodes)
     if parity is not None and len(nodes) > 1:
         where, values = (
@@ -205,7 +205,7 @@ def _through(nodes: Nodes, values: np.ndarray, at: float, parity: np.ndarray | N
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Openings:
-    """How wide a round lens is open, seen from the image: an ellipse for each field.
+    """Vignetted pupil of a round lens, seen from the image: an ellipse for each field.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ class Openings:
     axes
         Widths (wavelengths, fields, 2) along the field and across it, over the stop's diameter.
     middles
-        Where their middles are along the fields (fields,), over half of that diameter; None for the axis.
+        Centres along the fields (fields,), over half of that diameter; None for the axis.
     """
 
     x: Nodes
@@ -225,13 +225,13 @@ class Openings:
     middles: np.ndarray | None = None
 
     def at(self, field: float, wavelength: float) -> tuple[float, float]:
-        """Of a field, a tangent, at a wavelength [m] that the lens' aberrations are known at."""
+        """Widths along and across a field, a tangent, at one of the wavelengths of the aberrations [m]."""
         axes = _through(self.wavelengths, self.axes, wavelength, None)
         along, across = _through(self.x, axes, min(field, self.x[-1]), np.ones(2))
         return float(along), float(across)
 
     def middle(self, field: float) -> float:
-        """Of a field, a tangent, over half of the stop's diameter, along the field."""
+        """Centre of the opening along a field, a tangent, over half of the stop's diameter."""
         if self.middles is None:
             return 0.0
         return float(_through(self.x, self.middles[:, None], min(field, self.x[-1]), -np.ones(1))[0])
@@ -241,18 +241,18 @@ class Openings:
 class FieldPlate:
     """Plate of a main lens whose aberrations change over the field, in a stop that is round on the axis.
 
-    One field of light behind the lens does not tell where each part came from: use the plate `at` a field.
+    One field of light behind the lens does not show where each part came from: use the plate `at` a field.
 
     Parameters
     ----------
     aberrations
         Over the field.
     diameter
-        Of the stop and of the unit disc [m].
+        Diameter of the stop and of the unit disc [m].
     more
         Waves rms by Noll's index that all fields have besides.
     openings
-        Of a round lens whose stop looks different from each field; None for one round stop.
+        Openings of a round lens whose stop looks different from each field; None for one round stop.
     """
 
     aberrations: ZernikeMap
@@ -282,7 +282,7 @@ class FieldPlate:
         )  # fmt: skip
 
     def __call__(self, light: Field) -> Field:
-        """Refused: what one plate does is not what this one does."""
+        """Refuse a field: the phase of this plate depends on the direction of light."""
         raise GeometryError(OF_ONE_LENS)
 
 

@@ -1,4 +1,4 @@
-r"""Form of a lenslet: what of the path through it neither focus nor tilt describes.
+r"""Form of a lenslet: the path through it without focus and tilt.
 
 Over the square around a lenslet, products of Legendre polynomials are orthogonal. The path through it is
 

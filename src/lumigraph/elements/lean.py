@@ -1,4 +1,4 @@
-"""`Lean`: by how much lenslets and pixels stand off the planes that they are meant to lie in."""
+"""`Lean`: tilt and bow of the lenslet array, and tilt of the sensor."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +14,7 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Lean:
-    """Tilt of an array, its bow, and tilt of a sensor, about the axis; distances from the main lens grow.
+    """Tilt and bow of an array, and tilt of a sensor, about the axis; distances from the main lens grow.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ class Lean:
                 )
 
     def of_array(self, y: Any, x: Any) -> Any:
-        """How much farther from the main lens lenslets at (y, x) stand [m]."""
+        """Extra distance of lenslets at (y, x) from the main lens [m]."""
         return self.array[0] * y + self.array[1] * x + self.bow * (y**2 + x**2)
 
     def of_sensor(self, y: Any, x: Any) -> Any:
-        """How much farther from the main lens pixels at (y, x) stand [m]."""
+        """Extra distance of pixels at (y, x) from the main lens [m]."""
         return self.sensor[0] * y + self.sensor[1] * x

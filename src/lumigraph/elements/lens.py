@@ -37,7 +37,7 @@ class ThinLens:
     center
         (y, x) [m].
     edge
-        Of the stop: "grey" or "hard", see `CircularAperture`.
+        Edge of the stop: "grey" or "hard", see `CircularAperture`.
 
     Raises
     ------

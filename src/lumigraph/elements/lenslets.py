@@ -54,7 +54,7 @@ class LensletArray:
         Factor of all distances of the lattice, about the axis: the pitch over the lattice's. As a 0-d array
         it is differentiated through, for lenslets that abut everywhere: the edges' own movement is not.
     scatter
-        How single lenslets differ; not together with what is differentiated through. Apertures that stand
+        Differences of single lenslets; not together with what is differentiated through. Apertures that stand
         beside the lattice stay within their cells.
 
     Raises
@@ -149,9 +149,9 @@ class LensletArray:
         return replace(self, focal_length=focal_lengths, stretch=arrays.number(self.stretch))
 
     def _differentiable(self, fixed: "LensletArray", field: Field) -> Field:
-        """What `transmit` gives, with the derivatives of its phase -π|x - s c|²/(λ f).
+        """Field behind the lenslets as of `transmit`, differentiable in its phase -π|x - s c|²/(λ f).
 
-        They are those after the focal lengths f and the stretch s of the centres c.
+        Derivatives exist by the focal lengths f and the stretch s of the centres c.
         """
         y, x, turn = field.grid.y[:, None], field.grid.x, -np.pi / field.wavelength
         factor = arrays.like(fixed.transmission(field.grid, field.wavelength), field.data)
@@ -225,7 +225,7 @@ class LensletArray:
 
     @property
     def _along_axes(self) -> bool:
-        """Whether the transmission is a product of one factor along y and one along x."""
+        """True if the transmission is a product of one factor along y and one along x."""
         straight = self.lattice.basis[0][0] == 0 == self.lattice.basis[1][1]
         return self.scatter is None and straight and self.shape == "square" and len(self._focal) == 1
 

@@ -51,7 +51,7 @@ def random_phase_mask(
     grid
         Where the object's samples stand, N of them over the width W on each axis.
     wavelength
-        In vacuum [m]. Since d_c is inverse to it, the mask does not depend on it.
+        Wavelength in vacuum [m]. Since d_c is inverse to it, the mask does not depend on it.
     coherence_index
         C, number of sources along each axis, at most N.
     rng

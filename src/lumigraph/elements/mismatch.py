@@ -22,7 +22,7 @@ class Mismatch:
     sample_index
         n of the medium around the object.
     focus_depth
-        Of the focused plane below the coverslip [m].
+        Depth of the focused plane below the coverslip [m].
     coverslip, design
         (index, thickness [m]) of the coverslip in use and of the one in the design; both or neither.
 

@@ -18,7 +18,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectSpace:
-    """What a lens of glass makes of places before it.
+    """Map from places before a lens of glass to those before the thin lens in its exit pupil.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class ObjectSpace:
     _spline: list[BSpline] = field(default_factory=list, repr=False)
 
     def scale(self, y: np.ndarray, x: np.ndarray, distance: float | np.ndarray) -> np.ndarray:
-        """What places (y, x) before the glass [m] are multiplied by, at a distance of the thin lens [m]."""
+        """Factor of places (y, x) before the glass [m], at a distance of the thin lens [m]."""
         at = self.pupil_magnification * np.hypot(y, x) / distance
         return self.pupil_magnification * self._stretched(np.minimum(at, self.fields[-1]))
 

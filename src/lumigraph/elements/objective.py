@@ -1,13 +1,8 @@
-r"""What a point under a microscope objective sends to the plane of the native image.
+"""Field of a point under a microscope objective in the plane of the native image.
 
-A point at depth dz lights the pupil; with q = n sin θ and the sine condition q = M q' the field in the image,
-in object-space coordinates, is the Debye integral
-
-.. math:: U(r, \psi) = \int A(q, \varphi)\, e^{i k \sqrt{n^2 - q^2}\, dz + i W(q, \varphi)}
-          e^{i k q r \cos(\varphi - \psi)}\, \frac{q\, dq\, d\varphi}{\cos\theta}
-
-An aplanatic objective turns an isotropic emitter into A = sqrt(cos θ). The azimuth is expanded in harmonics,
-so that only radial integrals remain; they are tabulated once and interpolated.
+It is the Debye integral over the pupil, with the sine condition, in object-space coordinates. The azimuth is
+expanded in harmonics, so that only radial integrals remain; they are tabulated once and interpolated.
+docs/theory/elements.md has the equations.
 
 B. Richards & E. Wolf, Proc. R. Soc. A 253, 358 (1959); M. Broxton et al., Opt. Express 21, 25418 (2013).
 """
@@ -45,7 +40,7 @@ class Objective:
     Parameters
     ----------
     wavelength
-        In vacuum [m].
+        Wavelength in vacuum [m].
     numerical_aperture, index
         NA and the immersion's refractive index n.
     model
@@ -101,7 +96,7 @@ class Objective:
         object.__setattr__(self, "aberrations", tuple((int(j), float(w)) for j, w in pairs))
         if self.model == "rays" and (pairs or self.mismatch is not None or self.image_defocus):
             raise GeometryError(
-                "model 'rays' knows no aberrations, sample index or lenslet offset. "
+                "model 'rays' has no aberrations, sample index or lenslet offset. "
                 "Leave them out or use 'scalar'."
             )
 
@@ -127,7 +122,7 @@ class Objective:
 
     @property
     def is_round(self) -> bool:
-        """Whether the point's image is the same in every direction."""
+        """True if the point's image is rotationally symmetric."""
         return all(m == 0 for (_, m), _ in self.orders)
 
     @property
@@ -186,7 +181,7 @@ class Objective:
         return k * self.aperture * (radius + abs(dz) * ray + float(extra) + self.spread(part))
 
     def spread(self, part: float = 1.0) -> float:
-        """How far aberrations move this part of the rays at most, in object space [m]."""
+        """Largest displacement of this part of the rays by aberrations, in object space [m]."""
         return _slope(self.terms, part) * self.wavelength / self.numerical_aperture
 
     def depth_path(self, qy: np.ndarray, qx: np.ndarray) -> np.ndarray:
@@ -313,7 +308,7 @@ def _apodised(
 
 @lru_cache(maxsize=256)
 def _slope(terms: tuple[tuple[int, float], ...], part: float) -> float:
-    """Of the wavefront over the pupil [waves per radius]: below it for a part of the pupil's area."""
+    """Slope of the wavefront that a part of the pupil's area stays below [waves per radius]."""
     if not terms:
         return 0.0
     rho, angle = np.sqrt(np.linspace(0, 1, 65))[1:, None], np.linspace(0, 2 * np.pi, 129)
@@ -329,12 +324,12 @@ def _depth_path(objective: Objective, sine: np.ndarray, cosine: np.ndarray) -> n
 
 
 def _turned(harmonic: int, angle: np.ndarray) -> np.ndarray:
-    """Of `_apodised`, over the azimuth."""
+    """Azimuthal factor of a harmonic of `_apodised`."""
     return np.cos(harmonic * angle) if harmonic >= 0 else np.sin(-harmonic * angle)
 
 
 def _power_of(apodised: list[tuple[int, int, np.ndarray]], cosine: np.ndarray, weight: np.ndarray) -> float:
-    """Of all modes together in the image, by the nodes' weights."""
+    """Power of all modes together in the image, by the nodes' weights."""
     return sum((2 if not h else 1) * np.pi * float((a**2 / cosine * weight).sum()) for h, _, a in apodised)
 
 

@@ -37,7 +37,7 @@ Table = list[tuple[int, np.ndarray]]
 def tables_of(
     modes: Sequence[tuple[np.ndarray, np.ndarray]], q: np.ndarray, steps: np.ndarray
 ) -> list[Table]:
-    """Of modes, each of a spectrum (orders, nodes) over the azimuth and an amplitude (nodes,)."""
+    """Tables of modes, given by spectra (orders, nodes) over the azimuth and amplitudes (nodes,)."""
     counted = [_counted(spectrum) for spectrum, _ in modes]
     found: list[Table] = [[] for _ in modes]
     highest = max(abs(order) for orders in counted for order in orders)
@@ -91,6 +91,6 @@ def _first(order: int, q: np.ndarray, steps: np.ndarray) -> np.ndarray:
 
 
 def _j2(argument: np.ndarray) -> np.ndarray:
-    """By recurrence, three times as fast as jv."""
+    """Bessel function J_2 by recurrence, three times as fast as jv."""
     near = np.where(argument > 0, argument, 1)
     return 2 * j1(argument) / near - np.where(argument > 0, j0(argument), 0)

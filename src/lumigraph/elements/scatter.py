@@ -1,4 +1,4 @@
-"""`Scatter`: how lenslets of an array differ from each other, by chance and by what is their own."""
+"""`Scatter`: differences of the lenslets of an array, random and given."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -18,13 +18,13 @@ MOST_MISSING = 0.99
 """Part of the lenslets."""
 
 MOST = {"focal_length": 0.2, "decentre": 1.0, "missing": MOST_MISSING, "turn": 0.05, "form": 10e-6}
-"""By name, in SI."""
+"""Largest values by name, in SI."""
 
 UNITS = {"decentre": " m", "turn": " rad (of light, n - 1 times the tilt)", "form": " m"}
 
 
 class Warp(NamedTuple):
-    """What paths through lenslets have besides focus and vertex: angles [rad] and terms [m].
+    """Deviations of paths through lenslets besides focus and vertex: angles [rad] and terms [m].
 
     `down` and `across` (...) turn light towards later columns and rows; `terms` (..., k) are those of
     `lumigraph.elements.form`.
@@ -37,7 +37,7 @@ class Warp(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Own:
-    """What the lenslet of an index (i, j) has of its own; lengths along columns and rows of the array.
+    """Deviations of the lenslet of an index (i, j); lengths along columns and rows of the array.
 
     `focal_change` is the part by which its focal length is longer; `aside` (down, across) the way from its
     place on the lattice to the middle of its aperture, None for one on it, and `decentre` from the middle to
@@ -51,14 +51,14 @@ class Own:
 
     @property
     def vertex(self) -> tuple[float, float]:
-        """Way to it from the place on the lattice [m]."""
+        """Offset of the vertex from the place on the lattice [m]."""
         down, across = self.aside or (0.0, 0.0)
         return down + self.decentre[0], across + self.decentre[1]
 
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """How single lenslets differ: errors drawn by chance, alike for a lenslet and a seed, and what is given.
+    """Differences of single lenslets: random errors, reproducible by lenslet and seed, and given ones.
 
     Parameters
     ----------
@@ -70,15 +70,15 @@ class Scatter:
     missing
         Part of the lenslets that are opaque.
     seed
-        Of all that is drawn.
+        Seed of all random values.
     turn
         Standard deviation of the angles by which tilted lenslets turn light, along each axis of the array
         [rad]: of a spherical surface tilted by θ, (n - 1) θ.
     form
-        Of the path through a lenslet, what neither focus nor tilt describes: rms over the square around it
+        Form error of the path through a lenslet, without focus and tilt: rms over the square around it
         and over the lenslets [m]. Each of the terms of `form.TERMS` has the same part.
     own
-        Of single lenslets, beside what is drawn for them.
+        Deviations of single lenslets, beside what is drawn for them.
 
     Raises
     ------
@@ -112,9 +112,7 @@ class Scatter:
                 )
 
     def of(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Of lenslets (i, j): factor of the focal length, way from the lattice to the vertex along columns
-        and rows [m], presence.
-        """
+        """Focal-length factor, vertex offsets along columns and rows [m] and presence of lenslets (i, j)."""
         bend, down, across, there = (_uniform(i, j, self.seed, channel) for channel in range(4))
         factor = 1 + self.focal_length * np.clip(ndtri(bend), -4, 4)
         down, across = self.decentre * ndtri(down), self.decentre * ndtri(across)
@@ -125,7 +123,7 @@ class Scatter:
         return factor, down, across, there >= self.missing
 
     def aside(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """From the lattice to the middle of the apertures of lenslets (i, j), along columns and rows [m]."""
+        """Offsets of the apertures of lenslets (i, j) from the lattice, along columns and rows [m]."""
         found = np.zeros((2, *np.broadcast(i, j).shape))
         for mine, one in self._among(i, j):
             found[0][mine], found[1][mine] = one.aside or (0.0, 0.0)
@@ -138,15 +136,15 @@ class Scatter:
 
     @property
     def moves(self) -> bool:
-        """Whether apertures stand beside the lattice."""
+        """True if some apertures are off the lattice."""
         return any(any(one.aside or ()) for one in self.own)
 
     def in_row(self, i: int) -> "Scatter":
-        """What lenslets of a row follow from."""
+        """Scatter of the lenslets of a row."""
         return replace(self, own=tuple(one for one in self.own if one.index[0] == i))
 
     def naming(self, lenslets: Mapping[tuple[int, int], bool]) -> "Scatter":
-        """The same, which names these lenslets, too, and says where those stand that are marked."""
+        """Scatter that also lists these lenslets, with the apertures of those that are marked."""
         own = {one.index: one for one in self.own}
         named = {index: own.get(index, Own(index)) for index in lenslets}
         return replace(self, own=tuple(
@@ -156,11 +154,11 @@ class Scatter:
 
     @property
     def warps(self) -> bool:
-        """Whether lenslets are tilted or have a form of their own."""
+        """True if lenslets are tilted or have a form error."""
         return bool(self.turn or self.form)
 
     def warp(self, i: np.ndarray, j: np.ndarray) -> Warp:
-        """What paths through lenslets (i, j) have besides."""
+        """Tilt and form of the paths through lenslets (i, j)."""
         down, across, *terms = (
             np.clip(ndtri(_uniform(i, j, self.seed, channel)), -4, 4) for channel in range(4, 6 + len(TERMS))
         )
@@ -170,7 +168,7 @@ class Scatter:
 
 
 def _uniform(i: np.ndarray, j: np.ndarray, seed: int, channel: int) -> np.ndarray:
-    """Numbers between 0 and 1 by an index: a hash, whichever other lenslets are asked for."""
+    """Numbers between 0 and 1 by index, a hash, independent of the other lenslets in the call."""
     golden, first, second = (np.uint64(one) for one in _MULTIPLIERS)
     found = np.full(np.broadcast(i, j).shape, np.uint64(seed % 2**64))
     with np.errstate(over="ignore"):

@@ -16,10 +16,10 @@ from numpy.polynomial import Chebyshev
 from lumigraph.errors import GeometryError
 
 DEGREE = 24
-"""Of polynomials of the squared height: off by 2e-12 of the path at f/2.8, by 8e-7 where rays graze."""
+"""Degree of polynomials of the squared height: off by 2e-12 of the path at f/2.8, 8e-7 at grazing."""
 
 MARGIN = 1.03
-"""How much farther than the corners the surface has to go on."""
+"""Factor by which the surface has to extend beyond the corners."""
 
 D_LINE, F_LINE, C_LINE = 587.56e-9, 486.13e-9, 656.27e-9
 """Wavelengths of Abbe's number [m]."""
@@ -48,7 +48,7 @@ class Surface:
     conic
         Constant K: 0 of a sphere, -n² of what faces the sensor without spherical aberration.
     thickness
-        Of the glass from the vertex to the flat side [m], where it faces the main lens; None where it faces
+        Thickness of the glass, vertex to flat side [m], if it faces the main lens; None if it faces
         the sensor.
     """
 
@@ -61,7 +61,7 @@ class Surface:
         return _light(self, half, focal_length)[0](squared)
 
     def amplitude(self, squared: np.ndarray, half: float, focal_length: float) -> np.ndarray:
-        """Of the light there, 1 at the vertex: no power is lost."""
+        """Amplitude of the light there, 1 at the vertex: no power is lost."""
         return _light(self, half, focal_length)[1](squared)
 
     def seen(self, half: float, focal_length: float) -> float:

@@ -1,4 +1,4 @@
-"""What thin elements share: a factor for each sample, computed once for each grid."""
+"""Base of thin elements: a factor for each sample, computed once for each grid."""
 
 import warnings
 from typing import Literal, Protocol, runtime_checkable

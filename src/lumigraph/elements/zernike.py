@@ -47,13 +47,13 @@ def noll_to_nm(j: int) -> tuple[int, int]:
 
 
 FAMILIES = ("spherical aberration", "coma", "astigmatism", "trefoil", "quadrafoil", "pentafoil")
-"""By the order over the angle."""
+"""Names by the order over the angle."""
 
 ORDERS = ("", "secondary ", "tertiary ")
 
 
 def zernike_name(j: int) -> str:
-    """What a Zernike polynomial of Noll's index j is called.
+    """Name of the Zernike polynomial of Noll's index j.
 
     Raises
     ------
@@ -156,15 +156,15 @@ class ZernikePlate:
     coefficients
         Phase c_j [rad rms] by Noll's index j; one wave rms is 2π. The phase is the same for every wavelength.
     diameter
-        Of the unit disc [m]; opaque outside.
+        Diameter of the unit disc [m]; opaque outside.
     center
         (y, x) [m].
     edge
-        Of the stop: "grey" or "hard".
+        Edge of the stop: "grey" or "hard".
     axes
-        Of an elliptic stop, its widths along `direction` and across it over the diameter.
+        Widths of an elliptic stop along `direction` and across it, over the diameter.
     direction
-        From +x towards +y [rad].
+        Direction from +x towards +y [rad].
 
     Raises
     ------
@@ -213,7 +213,7 @@ class ZernikePlate:
 
     @property
     def area(self) -> float:
-        """Of the stop, over that of a round one of its diameter."""
+        """Area of the stop, over that of a round one of its diameter."""
         return self.axes[0] * self.axes[1]
 
     def transmission(self, grid: Grid, wavelength: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Experiments: what the thesis printed, what is right, and what lumigraph computes, side by side.
+"""Experiments: printed, correct and computed values of the thesis, side by side.
 
 - `registry`: `Row`, `Outcome`, `Context`, the decorator `experiment`
 - `collected`: all `experiments`, and `find`

@@ -1,4 +1,4 @@
-"""What is read off a picture of a USAF-1951 target: the contrast of its elements, and the finest resolved."""
+"""Reading of a USAF-1951 target's picture: the contrast of its elements, and the finest resolved."""
 
 import numpy as np
 from scipy.ndimage import map_coordinates

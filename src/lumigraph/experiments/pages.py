@@ -28,9 +28,9 @@ def write_report(chosen: Sequence[Experiment], results: Sequence[Result], path: 
     chosen, results
         Experiments and what they answered, in the same order.
     path
-        Of the page.
+        Path of the page.
     quick
-        Whether reduced sizes were run, which the page says.
+        True for reduced sizes, which the page mentions.
     """
     page = report.Page("The thesis, reproduced", INTRODUCTION)
     _overview(page, chosen, results, quick)

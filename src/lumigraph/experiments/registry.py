@@ -1,4 +1,4 @@
-"""What an experiment is, what it is given, what it answers, and how it is found by its id."""
+"""Experiments: their registry by id, their context and their outcome."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -23,15 +23,15 @@ class Row:
     Parameters
     ----------
     quantity
-        What was computed, such as "first zero, band limited".
+        Computed quantity, such as "first zero, band limited".
     got
-        What came out, in `unit`.
+        Computed value, in `unit`.
     unit
-        As it is shown: "µm", "dB", "1/m"; empty for a pure number.
+        Unit as it is shown: "µm", "dB", "1/m"; empty for a pure number.
     thesis
-        What is printed there, in the same unit; text where no number is; None where nothing is.
+        Value printed in the thesis, in the same unit; text where no number is; None where nothing is.
     expected
-        What is right; None for a number that is only shown.
+        Correct value; None for a number that is only shown.
     tolerance
         Largest absolute difference from `expected`, or the largest ones (below, above); may be infinite.
     note
@@ -55,7 +55,7 @@ class Row:
 
     @property
     def passed(self) -> bool | None:
-        """Whether `got` is within the tolerance; None where nothing is expected."""
+        """True if `got` is within the tolerance; None if nothing is expected."""
         if self.expected is None:
             return None
         below, above = self.margins
@@ -72,12 +72,12 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What an experiment answers.
+    """Result of an experiment.
 
     Parameters
     ----------
     rows
-        Its table.
+        Rows of its table.
     figures
         (image (y, x[, 3]) or figure of `lumigraph.plots`, caption).
     why
@@ -95,14 +95,14 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What an experiment is given.
+    """Size, output folder and progress callback of an experiment's run.
 
     Parameters
     ----------
     quick
         Run a reduced size of the same physics, in some seconds.
     folder
-        Where finished parts are kept; None keeps nothing.
+        Folder for finished parts; None keeps nothing.
     tell
         Called as ``tell(fraction)``, a `core.progress.Stage`.
     """
@@ -117,7 +117,7 @@ class Context:
             self.tell(Stage(min(max(fraction, 0.0), 1.0), what))
 
     def cached(self, name: str, function: Callable[[], Any]) -> Any:
-        """What `function` returns, an array or a dictionary of arrays, computed once per output folder.
+        """Result of `function`, an array or a dictionary of arrays, computed once per output folder.
 
         An interrupted run finds the part again and goes on with the same numbers: what is returned is
         the same whether it was computed or read.
@@ -125,7 +125,7 @@ class Context:
         Parameters
         ----------
         name
-            Of the part; letters, digits, "-", "_" and ".".
+            Name of the part; letters, digits, "-", "_" and ".".
         function
             Computes it.
 
@@ -171,11 +171,11 @@ class Experiment:
     id
         Such as "figure-3.2", "table-5.4" or "5.6".
     title
-        What it is about.
+        Subject of the experiment.
     question
-        What it answers, a sentence.
+        Question that it answers, a sentence.
     thesis
-        Where it stands there.
+        Place in the thesis.
     function
         Takes a `Context`, returns an `Outcome`.
     camera

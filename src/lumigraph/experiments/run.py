@@ -64,7 +64,7 @@ class Result:
 
     @classmethod
     def from_json(cls, content: bytes) -> "Result":
-        """What `to_json` wrote."""
+        """Result restored from `to_json`."""
         values = json.loads(content)
         values["rows"] = tuple(Row(**{**row, "tolerance": _pair(row["tolerance"])}) for row in values["rows"])
         values["pictures"] = tuple(Picture(**one) for one in values["pictures"])
@@ -185,7 +185,7 @@ def _version(name: str) -> str:
 
 
 def _peak_memory() -> int:
-    """Highest memory of this process so far [byte]; 0 where the system does not tell."""
+    """Highest memory of this process so far [byte]; 0 if the system does not report it."""
     try:
         import resource
     except ImportError:  # Windows

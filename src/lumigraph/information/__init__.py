@@ -1,15 +1,11 @@
-"""What a raw image tells of points of light: Fisher information, and the least errors of any estimate.
+"""Fisher information of a raw image about points of light, and the least errors of any estimate.
 
-- `bounds`: `bounds`, errors of place, depth and light over a volume; `Bounds`, the result
-- `slopes`: `slopes`, how a bound changes with the parts of an instrument; `followed`, images of points that
-  are followed back to these
+- `bounds`: `bounds`, errors of place, depth and light over a volume; `noise`, information of a pixel
+- `slopes`: `slopes`, derivatives of a bound by an instrument's parts; `followed`, its way back
 - `points`: images of points and their derivatives by place, of any instrument
-- `noise`: information of a pixel with photon and read noise
-- `reconstruction`: `reconstruction_error`, what the best linear reconstruction of scenes leaves
-- `reconstruction_slopes`: `reconstruction_slopes`, how that changes with the parts of a camera
-- `reconstruction_trials`: `reconstruction_trials`, errors of drawn scenes' reconstructions
-- `scenes`: `Scenes`, what pictures have in common; `imaging`, their raw images and the noise
-- `trials`: `trials`, errors of the most likely places in drawn noise, to set beside the bounds
+- `reconstruction`: `reconstruction_error`, what the best linear reconstruction of `Scenes` leaves
+- `reconstruction_slopes`, `reconstruction_trials`: its derivatives; errors of drawn scenes
+- `trials`: `trials`, errors of the most likely places in drawn noise, to compare with the bounds
 """
 
 from lumigraph.information.bounds import Bounds, Light, bounds

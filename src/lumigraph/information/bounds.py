@@ -1,14 +1,11 @@
-r"""`bounds`: how well any estimate can know where a point of light is, from one raw image.
+r"""`bounds`: the least errors of a point's place, depth and light by any estimate from one raw image.
 
-With mean electrons μ of each pixel and unknowns θ (y, x, dz, brightness, and the background where there is
-one) the Fisher information is
+With mean electrons μ of each pixel and unknowns θ (y, x, dz, brightness, background) Fisher's information is
 
 .. math:: F_{ij} = \sum_{pixels} \phi(\mu, \sigma)\, \partial_i \mu\, \partial_j \mu
 
 with φ of Poisson electrons and Gaussian read noise; the variance of an unbiased estimate of θᵢ is at least
-(F⁻¹)ᵢᵢ, the others unknown too.
-
-R. J. Ober, S. Ram & E. S. Ward, Biophys. J. 86, 1185 (2004).
+(F⁻¹)ᵢᵢ, the others unknown too. R. J. Ober, S. Ram & E. S. Ward, Biophys. J. 86, 1185 (2004).
 """
 
 import math
@@ -32,7 +29,7 @@ from lumigraph.sensor import Sensor
 MOST_PLACES, MOST_DEPTHS = 1000, 1000
 
 PARTS = {"lateral": slice(0, 2), "depth": slice(2, 3), "brightness": slice(3, 4)}
-"""Of what is unknown of a point, by name."""
+"""Unknowns of a point, by name."""
 
 DOUBTFUL = 0.05
 """Relative error of a derivative that is warned of."""
@@ -40,7 +37,7 @@ DOUBTFUL = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """Of a point and around it.
+    """Light of a point, and background around it.
 
     Parameters
     ----------
@@ -76,7 +73,7 @@ class Bounds:
         (nz, k, 2), (y, x) in the cell over which places repeat [m].
     deviations
         (nz, k, n): y, x, dz [m], brightness over its value, and the background over its value where there is
-        one. Infinite where the raw image does not tell.
+        one. Infinite where the raw image does not determine it.
     caught
         (nz,), part of the point's light that falls on the pixels, in the mean.
     light
@@ -101,30 +98,30 @@ class Bounds:
         return np.sqrt(np.mean(self.deviations**2, axis=1))
 
     def of(self, name: str) -> np.ndarray:
-        """Of "lateral", "depth" or "brightness" at each depth (nz,), rms; the first two in metres."""
+        """Rms deviation of "lateral", "depth" or "brightness" at each depth (nz,); the first two in m."""
         return np.sqrt(np.mean(self.deviations[..., PARTS[name]] ** 2, axis=(1, 2)))
 
     @property
     def lateral(self) -> float:
-        """Of y and x over the volume, rms [m]."""
+        """Rms deviation of y and x over the volume [m]."""
         return float(np.sqrt(np.mean(self.deviations[..., :2] ** 2)))
 
     @property
     def depth(self) -> float:
-        """Of dz over the volume, rms [m]."""
+        """Rms deviation of dz over the volume [m]."""
         return float(np.sqrt(np.mean(self.deviations[..., 2] ** 2)))
 
     @property
     def brightness(self) -> float:
-        """Of the brightness, over its value, rms."""
+        """Rms deviation of the brightness over its value."""
         return float(np.sqrt(np.mean(self.deviations[..., 3] ** 2)))
 
     def uneven(self, name: str) -> float:
-        """How far "lateral", "depth" or "brightness" may be off as places are few, relative.
+        """Relative sampling error of "lateral", "depth" or "brightness", as places are few.
 
         Half of what variances differ by from place to place, over the number of places: they fill the cell
-        evenly, so that errors fall faster than those of places drawn by chance. NaN of one place, and of what
-        is not told.
+        evenly, so that errors fall faster than those of places drawn by chance. NaN for one place, and for
+        what cannot be determined.
         """
         variances = np.mean(self.deviations[..., PARTS[name]] ** 2, axis=(0, 2))
         count = len(variances)
@@ -133,7 +130,7 @@ class Bounds:
         return float(variances.std(ddof=1) / variances.mean()) / 2 / count
 
     def beside(self, other: "Bounds") -> "Bounds":
-        """Of its places and others at the same depths, before the same light."""
+        """Bounds at these places and at others of the same depths, before the same light."""
         own, more = self.places.shape[1], other.places.shape[1]
         return Bounds(
             self.depths, np.concatenate([self.places, other.places], 1),
@@ -143,7 +140,7 @@ class Bounds:
         )  # fmt: skip
 
     def quantities(self) -> tuple[Quantity, ...]:
-        """Over the volume."""
+        """Values over the volume, with units and equations."""
         return (
             Quantity("lateral_bound", self.lateral, "m"), Quantity("depth_bound", self.depth, "m"),
             Quantity("brightness_bound", self.brightness, "1"),
@@ -151,7 +148,7 @@ class Bounds:
         )  # fmt: skip
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each depth, in metres; of what cannot be told None."""
+        """Row for each depth, in metres; None for what cannot be determined."""
         found = []
         for dz, some, caught in zip(self.depths, self.over_depths, self.caught, strict=True):
             values = [float(v) if math.isfinite(v) else None for v in some]
@@ -171,7 +168,7 @@ def bounds(
     checked: bool = True,
     progress: Progress | None = None,
 ) -> Bounds:
-    """How well a single point of light can be placed by one raw image, over depths and a lenslet's cell.
+    """Least errors of a point's place, depth and light from one raw image, over depths and a cell.
 
     Its place, depth and brightness are unknown, and the background where there is some. Noise is that of
     photons, dark current, reading and rounding; fixed patterns are taken as known. The points stand around
@@ -306,7 +303,7 @@ def reading(sensor: Sensor) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Spot:
-    """What is known of a point at a place."""
+    """Deviations of a point at one place."""
 
     deviations: np.ndarray
     caught: float
@@ -322,7 +319,7 @@ class _Spot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """What pixels tell of a point.
+    """Information of pixels about a point.
 
     Parameters
     ----------
@@ -341,7 +338,7 @@ class Seen:
 
     @classmethod
     def of(cls, sensor: Sensor, light: Light, lit: np.ndarray) -> "Seen":
-        """Of parts of a point's light and their derivatives (4, ny, nx)."""
+        """Information of parts of a point's light and their derivatives (4, ny, nx)."""
         some, noise = np.any(lit, axis=0), reading(sensor)
         mean, changes = expected(sensor, light, lit[:, some])
         found = fisher(mean, changes, noise)

@@ -41,11 +41,11 @@ class Followed(Protocol):
 
     @property
     def depths(self) -> Sequence[float]:
-        """Of each point [m]."""
+        """Depth of each point [m]."""
         ...
 
     def lit(self, number: int) -> tuple[np.ndarray, Back]:
-        """As `Source.lit` (4, ny, nx), of a point; and the way back from there."""
+        """Image (4, ny, nx) of a point with derivatives, as `Source.lit`, and the function back from it."""
         ...
 
     def along(self) -> np.ndarray:
@@ -65,7 +65,7 @@ def require_followed(instrument: Instrument) -> None:
         instrument.part_images([])
     elif not isinstance(instrument, WithObjective):
         raise GeometryError(
-            "derivatives of bounds by an instrument's parts are of microscopes and of cameras. For others, "
+            "only cameras and microscopes have derivatives of bounds by an instrument's parts. For others, "
             "use search 'local'."
         )
     elif not instrument.in_pupil and not has_phase(cast(LightFieldMicroscope, instrument)):
@@ -78,7 +78,7 @@ def require_followed(instrument: Instrument) -> None:
 def followed(
     instrument: Instrument, pairs: Sequence[Pair], depths: np.ndarray, numbers: range, accuracy: float
 ) -> Iterator[Followed]:
-    """Of points at some places of each depth, as `bounds` takes them: parts of a cell, which may differ.
+    """Images of points at some places of each depth, followed back to pairs' differences.
 
     They shine alike before all, who collect as much of it as their apertures do.
 
@@ -103,7 +103,7 @@ def followed(
 
 
 OPTICAL = ("pixel_pitch", "shape"), ("pixel_pitch", "shape", "fill_factor", "angular_response")
-"""What of sensors images follow from, not their noise: of microscopes and of cameras."""
+"""Keys of sensors that images, not their noise, follow from: of microscopes and of cameras."""
 
 
 def require_alike(instrument: Instrument, other: Instrument) -> None:
@@ -119,13 +119,13 @@ def require_alike(instrument: Instrument, other: Instrument) -> None:
     counts = [_lenslets(one) for one in (instrument, other)]
     if type(instrument) is not type(other) or same != own or counts[0] != counts[1]:
         raise GeometryError(
-            "derivatives of bounds and errors are by optics and by the pixels' pitch; two instruments have "
-            "other numbers of lenslets, or other sensors. Use search 'local' for these."
+            "bounds and errors can be differentiated by the optics and the pixels' pitch, but two "
+            "instruments have different numbers of lenslets, or different sensors. Use search 'local'."
         )
 
 
 def _lenslets(instrument: Instrument) -> tuple[int, ...]:
-    """How many; none of a camera without any."""
+    """Number of lenslets; empty for a camera without any."""
     if isinstance(instrument, WithParts) and not isinstance(instrument, LensletCamera):
         return ()
     return cast(LensletCamera, instrument).lenslets.count
@@ -135,7 +135,7 @@ Cameras = tuple[WithParts, WithParts]
 
 
 def _cut(camera: WithParts, depths: np.ndarray, like: WithParts | None = None) -> WithParts:
-    """With as few lenslets as `bounds` has; all pixels where there are none, for they tell the background."""
+    """Camera with as few lenslets as `bounds` has; all pixels without any, since they see background."""
     if isinstance(camera, LensletCamera):
         return small(camera, depths, like=cast(LensletCamera | None, like))
     return camera
@@ -144,7 +144,7 @@ def _cut(camera: WithParts, depths: np.ndarray, like: WithParts | None = None) -
 def before_camera(
     camera: WithParts, pairs: Sequence[Cameras], where: tuple[np.ndarray, range], accuracy: float
 ) -> PartPoints | LeaningPoints:
-    """Of a camera, cut to lenslets or pixels that are lit; at depths, and numbers of places in a cell."""
+    """Images of a camera, cut to lit lenslets or pixels, at depths, and numbers of places in a cell."""
     depths, own = np.sort(where[0]), _cut(camera, where[0])
     cut = [tuple(_cut(end, where[0], like=own) for end in pair) for pair in pairs]
     images = own.part_images(cast(Sequence[Cameras], cut), accuracy=accuracy)
@@ -169,7 +169,7 @@ def before_lenslets(
     scope: LightFieldMicroscope, pairs: Sequence[Scopes], where: tuple[np.ndarray, range], accuracy: float,
     *, double: bool = False,
 ) -> "BeforeLenslets":  # fmt: skip
-    """Of a microscope whose lenslets stand in its image; at depths, and numbers of places in a cell."""
+    """Images of a microscope whose lenslets stand in its image, at depths and numbers of places."""
     depths, numbers = where
     far = float(np.abs(depths).max())
 
@@ -191,7 +191,7 @@ class BeforeLenslets(PupilPoints):
 
     @property
     def depths(self) -> Sequence[float]:
-        """As `Followed.depths`."""
+        """Depths, as `Followed.depths`."""
         return self.own.points.positions[:, 2].tolist()
 
 
@@ -222,11 +222,11 @@ class BeforeMicroscope:
 
     @property
     def depths(self) -> Sequence[float]:
-        """As `Followed.depths`."""
+        """Depths, as `Followed.depths`."""
         return [float(self._planes[k]) for k, _ in self._places]
 
     def lit(self, number: int) -> tuple[np.ndarray, Back]:
-        """As `Followed.lit`."""
+        """Image and function that leads back, as `Followed.lit`."""
         behind = [Behind.of(one, *self._places[number]) for one in self._own]
         windows = [_window(one, self._scope.sensor.shape) for one in behind]
         seen = np.zeros((4, *self._scope.sensor.shape))
@@ -242,7 +242,7 @@ class BeforeMicroscope:
             self._by[k] = one.back(given, self._by[k])
 
     def along(self) -> np.ndarray:
-        """As `Followed.along`."""
+        """Changes, as `Followed.along`."""
         return np.array([self._between(pair) for pair in self._pairs])
 
     def _between(self, pair: Scopes) -> float:

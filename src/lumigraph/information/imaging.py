@@ -21,10 +21,10 @@ from lumigraph.sensor import Sensor
 from lumigraph.simulation.microscope_scene import SAMPLES
 
 ENOUGH = 1e-3
-"""Of a sum, what conjugate gradients may leave."""
+"""Part of a sum that conjugate gradients may leave."""
 
 STEPS = 500
-"""Of conjugate gradients, at most."""
+"""Steps of conjugate gradients, at most."""
 
 Seeing = tuple[Linear, np.ndarray, Sensor]
 """Operator of planes, the object's area whose light is 1 in a pixel (nz,) [m²], and the sensor."""
@@ -93,12 +93,12 @@ class Imaging:
             size = float((rest * ahead).sum())
             step = ahead + size / before * step
         raise GeometryError(
-            f"the reconstruction is not found in {STEPS} steps: the light is too strong beside the noise. "
+            f"the reconstruction does not converge in {STEPS} steps: the light is too strong for the noise. "
             "Use fewer photons."
         )
 
     def covered(self, z: np.ndarray) -> np.ndarray:
-        """P z, what is left times an object (nz, n, n)."""
+        """P z: the remaining covariance times an object (nz, n, n)."""
         return coloured(self.solved(coloured(z, self.power)), self.power)
 
     def reconstructed(self, raw: np.ndarray) -> np.ndarray:
@@ -123,7 +123,7 @@ def shares(z: np.ndarray, found: np.ndarray) -> np.ndarray:
 def imaging(
     instrument: Instrument, depths: np.ndarray, scenes: Scenes, light: Light, accuracy: float
 ) -> Imaging:
-    """Of an instrument and scenes at depths that shine at once; see `reconstruction_error`."""
+    """Linear problem of an instrument and scenes at depths that shine at once; see `reconstruction_error`."""
     check(instrument, depths, scenes)
     operator, area, sensor = _operator(instrument, depths, scenes, accuracy)
     grid = operator.object_grid
@@ -181,7 +181,7 @@ def _operator(instrument: Instrument, depths: np.ndarray, scenes: Scenes, accura
 
 
 def _electrons(sensor: Sensor, scenes: Scenes, light: Light) -> float:
-    """Of an area of the mean scene [1/m²]."""
+    """Electrons of an area of the mean scene [1/m²]."""
     return sensor.quantum_efficiency * light.photons / scenes.pitch**2
 
 
@@ -191,7 +191,7 @@ def electrons(instrument: Instrument, depths: np.ndarray, scenes: Scenes, light:
 
 
 def _area(instrument: Instrument, depths: np.ndarray) -> np.ndarray:
-    """As of `Seeing`."""
+    """Area of the object (nz,) that stands for a pixel [m²]."""
     if isinstance(instrument, WithPupil):
         scope = cast(LightFieldMicroscope, instrument)
         area = (scope.lenslet_size * scope.sensor.pixel_pitch / scope.micro_image_pitch) ** 2
@@ -217,13 +217,13 @@ def _of_camera(camera: Camera, depths: np.ndarray, scenes: Scenes, accuracy: flo
 
 
 def _repeats(camera: Camera) -> bool:
-    """Whether it has an operator of its own: lenslets that are alike, or none."""
+    """True if the camera has an operator of its own: lenslets that are alike, or none."""
     array = camera.lenslet_array()
     return array is None or array.scatter is None
 
 
 def _grid(scenes: Scenes, finest: float) -> Grid:
-    """So fine that copies of a scene's waves by the samples are finer than what a lens resolves."""
+    """Grid fine enough that aliases of a scene's waves are finer than a lens resolves."""
     finer = math.ceil(scenes.pitch / finest + 0.5)
     n, pitch = scenes.samples * finer, scenes.pitch / finer
     middle = pitch / 2 if n % 2 == 0 else 0.0

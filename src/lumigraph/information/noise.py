@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import gammaln, xlogy
 
 RESOLVED = 0.1
-"""Read noise [electrons] below which every electron is told from the next: φ is 1/μ to 1e-5."""
+"""Read noise [electrons] below which single electrons are resolved: φ is 1/μ to 1e-5."""
 
 BRIGHT = 100.0
 """Mean electrons above which φ is 1/(μ + σ²): to 2e-3 for any σ, and less far above."""

@@ -50,7 +50,7 @@ class Source(Protocol):
 
     @property
     def pixels(self) -> int:
-        """Of each image."""
+        """Number of pixels of each image."""
         ...
 
     def cell(self, dz: float) -> np.ndarray:
@@ -70,7 +70,7 @@ class Source(Protocol):
 
 
 def source(instrument: Instrument, depths: np.ndarray, accuracy: float) -> Source:
-    """Of an instrument.
+    """Images of points of an instrument.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def collected(instrument: Instrument) -> float:
 def differences(
     image: Callable[[np.ndarray], np.ndarray], place: np.ndarray, steps: np.ndarray, checked: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As `Source.lit`, by central differences; where they are checked, of two steps (Richardson)."""
+    """Image and derivatives, as `Source.lit`, by central differences; by two steps if checked."""
     found, errors = [image(place)], []
     for axis, step in enumerate(steps):
         move = np.eye(3)[axis] * step
@@ -123,7 +123,7 @@ def differences(
 
 @dataclass(frozen=True, eq=False)
 class CameraSource:
-    """Of a camera with a main lens.
+    """Images of points of a camera with a main lens.
 
     Parameters
     ----------
@@ -141,11 +141,11 @@ class CameraSource:
 
     @property
     def pixels(self) -> int:
-        """As `Source.pixels`."""
+        """Number of pixels, as `Source.pixels`."""
         return math.prod(self.camera.sensor.shape)
 
     def cell(self, dz: float) -> np.ndarray:
-        """That of the lattice, as the main lens shows it; without lenslets a pixel's."""
+        """Cell of the lattice, as the main lens images it; a pixel's without lenslets."""
         scale = (self.camera.object_distance + dz) / self.camera.separation
         lattice = self.camera.lattice
         if lattice is None:
@@ -153,7 +153,7 @@ class CameraSource:
         return _cell(lattice) * scale
 
     def image(self, place: np.ndarray) -> np.ndarray:
-        """As `Source.image`."""
+        """Image, as `Source.image`."""
         points = Points(place[None], np.ones(1))
         if self.camera.lattice is None:
             found, _ = single_lens.points_image(self._optics, points)
@@ -162,7 +162,7 @@ class CameraSource:
         return self.part(float(place[2])) * np.asarray(found, np.float64)
 
     def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
-        """As `Source.lit`."""
+        """Image and derivatives, as `Source.lit`."""
         if has_changes(self._optics):
             found = self._seen(lambda optics, known: place_changes(optics, place, self.accuracy, known))
             return self.part(float(place[2])) * found.astype(np.float64), np.zeros(3)
@@ -175,7 +175,7 @@ class CameraSource:
         return resolved(self.camera.optics(), self.accuracy)
 
     def _seen(self, of: Callable[[CameraOptics, Relays], np.ndarray]) -> np.ndarray:
-        """By the camera, or by those that do not lean and stand for it."""
+        """Sum over the camera, or over the upright cameras that replace a leaning one."""
         if self._flat is None:
             return of(self._optics, self._relays[0])
         both = zip(self._flat.cameras, self._relays, self._flat.weights, strict=True)
@@ -187,7 +187,7 @@ class CameraSource:
 
     @cached_property
     def _relays(self) -> list[Relays]:
-        """Of the camera, or of each that stands for it."""
+        """Relays of the camera, or of each upright camera that replaces it."""
         return [self._relays_of(one) for one in (self._flat.cameras if self._flat else (self._optics,))]
 
     def _relays_of(self, optics: CameraOptics) -> Relays:
@@ -195,7 +195,7 @@ class CameraSource:
         return Relays(max(distances, key=lambda z: cells.blur(optics, z)))
 
     def part(self, dz: float) -> float:
-        """Of the light through the main lens, in an image of 1: a sample of the object has more nearer by."""
+        """Light of the main lens in an image of 1: a sample of the object sends more from nearer by."""
         optics = self._optics
         depth = dz if optics.objects is None else float(optics.objects.depth(dz))
         step = optics.object_pitch * optics.separation / (optics.object_distance + depth)
@@ -210,7 +210,7 @@ def _cell(lattice: Lattice) -> np.ndarray:
 
 
 def near_axis(camera: Camera, depths: np.ndarray, width: float = 0.0, like: Camera | None = None) -> Camera:
-    """With only as many lenslets, or pixels, as light of planes of a width [m] around the axis reaches.
+    """Camera with only the lenslets, or pixels, that light of planes of a width [m] around the axis reaches.
 
     Or with as many as `like` another.
     """
@@ -225,7 +225,7 @@ def near_axis(camera: Camera, depths: np.ndarray, width: float = 0.0, like: Came
 def small(
     camera: LensletCamera, depths: np.ndarray, width: float = 0.0, like: LensletCamera | None = None
 ) -> LensletCamera:
-    """With only as many lenslets as light of these depths reaches, and some more; or as `like` another."""
+    """Camera with only the lenslets that light of these depths reaches, and some; or as `like` another."""
     if like is None:
         shape, count = None, _lit(camera, depths, width)
     else:
@@ -239,14 +239,14 @@ def small(
 
 
 def _lit(camera: LensletCamera, depths: np.ndarray, width: float) -> tuple[int, ...]:
-    """How many lenslets that is."""
+    """Number of lenslets (rows, columns) that light reaches."""
     pitch = camera.lenslets.pitch * (3 if camera.lattice.kinds > 1 else 1)  # points move by a cell
     wanted = math.ceil((_reached(camera, depths, width) + pitch) / camera.lenslets.row_pitch) + 2 * SPARE
     return tuple(min(n, wanted + (n - wanted) % 2) for n in camera.lenslets.count)
 
 
 def _reached(camera: Camera, depths: np.ndarray, width: float) -> float:
-    """How wide the light of planes of a width is before lenslets, or on the sensor without them [m]."""
+    """Width of the light of planes of a width, before lenslets, or on the sensor without them [m]."""
     diameter, farthest = camera.pupil_diameter, 0.0
     for dz in depths:
         distance = camera.defocused(float(dz))
@@ -259,7 +259,7 @@ def _reached(camera: Camera, depths: np.ndarray, width: float) -> float:
 
 
 def has_phase(scope: LightFieldMicroscope) -> bool:
-    """Whether images of points are known by the pupil: not traced by rays."""
+    """True if images of points are computed by the pupil, not traced by rays."""
     return scope.objective.model != "rays"
 
 
@@ -274,44 +274,44 @@ def _of_microscope(scope: LightFieldMicroscope, depths: np.ndarray, accuracy: fl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FourierSource:
-    """Of a Fourier microscope."""
+    """Images of points of a Fourier microscope."""
 
     scope: LightFieldMicroscope
     points: FourierPoints
 
     @property
     def pixels(self) -> int:
-        """As `Source.pixels`."""
+        """Number of pixels, as `Source.pixels`."""
         return math.prod(self.scope.sensor.shape)
 
     def cell(self, dz: float) -> np.ndarray:
-        """A pixel's, in the object: behind every lenslet points move alike."""
+        """Cell of a pixel in the object: behind every lenslet points move alike."""
         return np.eye(2) * self.scope.object_grid.pitch[0]
 
     def image(self, place: np.ndarray) -> np.ndarray:
-        """As `Source.image`."""
+        """Image, as `Source.image`."""
         return self.points.image(*place.tolist()) / self.points.whole
 
     def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
-        """As `Source.lit`."""
+        """Image and derivatives, as `Source.lit`."""
         y, x, dz = place.tolist()
         return self.points.lit(y, x, dz) / self.points.whole, np.zeros(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MicroscopeSource:
-    """Of a microscope whose images are known as such."""
+    """Images of points of a microscope, without derivatives."""
 
     scope: LightFieldMicroscope
     accuracy: float
 
     @property
     def pixels(self) -> int:
-        """As `Source.pixels`."""
+        """Number of pixels, as `Source.pixels`."""
         return math.prod(self.scope.sensor.shape)
 
     def cell(self, dz: float) -> np.ndarray:
-        """A lenslet's, in the object."""
+        """Cell of a lenslet in the object."""
         return np.array(self.scope.lattice.basis) / self.scope.magnification
 
     @property
@@ -321,12 +321,12 @@ class MicroscopeSource:
         return (pixels / SAMPLES) ** 2
 
     def image(self, place: np.ndarray) -> np.ndarray:
-        """As `Source.image`."""
+        """Image, as `Source.image`."""
         y, x, dz = place.tolist()
         return self.scope.point_image(y, x, dz, accuracy=self.accuracy) / self.whole
 
     def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
-        """As `Source.lit`."""
+        """Image and derivatives, as `Source.lit`."""
         one = self.scope.objectives[0]
         across = ACROSS * one.wavelength / (2 * one.aperture)
         along = ALONG * one.wavelength * one.medium / (4 * one.aperture**2)
@@ -335,7 +335,7 @@ class MicroscopeSource:
 
 @dataclass(frozen=True, eq=False)
 class PupilSource(MicroscopeSource):
-    """Of a microscope whose images are known by its pupil."""
+    """Images of points of a microscope, by its pupil."""
 
     images: PupilImages
 
@@ -344,11 +344,11 @@ class PupilSource(MicroscopeSource):
         object.__setattr__(self, "images", images)
 
     def image(self, place: np.ndarray) -> np.ndarray:
-        """As `Source.image`."""
+        """Image, as `Source.image`."""
         return self.images.forward(Points(place[None], np.ones(1)), np.zeros(0)) / self.whole
 
     def lit(self, place: np.ndarray, *, checked: bool) -> tuple[np.ndarray, np.ndarray]:
-        """As `Source.lit`."""
+        """Image and derivatives, as `Source.lit`."""
         (one,) = self.images.lit(Points(place[None], np.ones(1)), np.zeros(0))
         (rows, columns), pixels = self.images.seen(np.concatenate([one.image[None], one.changes]), one.cell)
         found = np.zeros((len(pixels), *self.images.shape))

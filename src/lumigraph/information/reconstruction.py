@@ -1,16 +1,12 @@
-r"""`reconstruction_error`: what the best linear reconstruction of scenes leaves, from one raw image.
+r"""`reconstruction_error`: error of the best linear reconstruction of scenes from one raw image.
 
-Scenes are Gaussian with covariance C, raw images A x + noise of variance N, the mean scene's. The best linear
-estimate leaves the covariance
+Scenes are Gaussian with covariance C, raw images A x + noise of variance N. The best linear estimate leaves
 
 .. math:: P = C^{1/2} (1 + C^{1/2} A^T N^{-1} A C^{1/2})^{-1} C^{1/2}
 
-whatever the scene's distribution, if its covariance is C (Wiener). Its trace is the mean of zᵀ P z over
-objects z with waves of all frequencies, alike in strength and of phases by chance: before a camera that does
-the same to the light everywhere one z has no scatter. Each is one solution by conjugate gradients.
-
-S. M. Kay, "Fundamentals of Statistical Signal Processing", vol. 1, Prentice Hall 1993, chapter 12.
-M. F. Hutchinson, Commun. Stat. Simul. Comput. 18, 1059 (1989).
+Its trace is the mean of zᵀ P z over random objects z, each solved by conjugate gradients: see
+docs/theory/information.md. S. M. Kay, "Fundamentals of Statistical Signal Processing", vol. 1, Prentice Hall
+1993, chapter 12; M. F. Hutchinson, Commun. Stat. Simul. Comput. 18, 1059 (1989).
 """
 
 import math
@@ -70,16 +66,16 @@ class ReconstructionError:
 
     @property
     def value(self) -> float:
-        """Over the depths, rms."""
+        """Rms error over the depths."""
         return float(np.sqrt(np.mean(self.errors**2)))
 
     def quantities(self) -> tuple[Quantity, ...]:
-        """Over the depths."""
+        """Values over the depths, with units and equations."""
         off = self.value * self.uncertain
         return (Quantity("reconstruction_error", self.value, "1", (self.value - off, self.value + off)),)
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each depth, in metres."""
+        """Row for each depth, in metres."""
         return [
             {"depth [m]": float(dz), "reconstruction error": float(e)}
             for dz, e in zip(self.depths, self.errors, strict=True)
@@ -172,7 +168,7 @@ def reconstruction_error(
 def _summed(
     planes: np.ndarray, left: np.ndarray, off: list[float], scenes: Scenes, brightest: float
 ) -> ReconstructionError:
-    """From what is left of each wave (nz, n, n), and of the errors of each group's sum."""
+    """Error by what is left of each wave (nz, n, n), and by the standard errors of each group's sum."""
     at, power = frequencies(scenes.samples), scenes.power
     inside = at > 0
     errors = np.sqrt(left[:, inside].sum(1)) / scenes.contrast
@@ -187,7 +183,7 @@ def _summed(
 
 
 class Probed(NamedTuple):
-    """What is left of each wave (nz, n, n), the standard error of the sum, and P z (nz, n, n) of each z."""
+    """Rest of each wave (nz, n, n), the standard error of the sum, and P z (nz, n, n) of each z."""
 
     left: np.ndarray
     off: float
@@ -195,7 +191,7 @@ class Probed(NamedTuple):
 
 
 def probed(seen: Imaging, samples: int) -> Probed:
-    """By as many objects z as leave the sum even."""
+    """Rest by as many objects z as make the sum even."""
     rng = np.random.default_rng(0)  # alike for all cameras: differences are theirs
     left, found, sums = [], [], np.zeros(0)
     for z in _objects(rng, (seen.planes, samples, samples)):

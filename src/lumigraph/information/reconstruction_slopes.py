@@ -1,4 +1,4 @@
-r"""`reconstruction_slopes`: how the error of reconstructed scenes changes with the instrument.
+r"""`reconstruction_slopes`: derivatives of the error of reconstructed scenes by an instrument's parts.
 
 With u = P z, the covariance that is left times one of the objects z of `reconstruction_error`,
 
@@ -95,7 +95,7 @@ def require_planes(instrument: Instrument) -> None:
     require_followed(instrument)
     if not isinstance(instrument, SeesVolumes):
         raise GeometryError(
-            "derivatives of the error of scenes are of cameras and microscopes. For others, use search "
+            "only cameras and microscopes have derivatives of the error of scenes. For others, use search "
             "'local'."
         )
 
@@ -129,7 +129,7 @@ def _at(
 def _electrons(
     end: Instrument, instrument: Instrument, depths: np.ndarray, of: tuple[Scenes, Light]
 ) -> np.ndarray:
-    """Of a pixel for 1 of the operator (nz,): an instrument gets its light by its aperture."""
+    """Electrons of a pixel for 1 of the operator (nz,): an instrument gets its light by its aperture."""
     scenes, light = of
     photons = light.photons * collected(end) / collected(instrument)
     return electrons(end, depths, scenes, Light(photons, light.background))

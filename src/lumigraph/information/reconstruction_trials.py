@@ -1,4 +1,4 @@
-"""`reconstruction_trials`: scenes drawn, seen with noise and reconstructed, beside what is expected."""
+"""`reconstruction_trials`: errors of drawn scenes, reconstructed from noisy raw images."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -40,7 +40,7 @@ class ReconstructionTrials:
 
     @property
     def rms(self) -> float:
-        """Over scenes and depths."""
+        """Rms error over scenes and depths."""
         return float(np.sqrt(np.mean(self.errors**2)))
 
     @property

@@ -1,4 +1,4 @@
-"""`Scenes`: what pictures have in common, as brightness, contrast and power over frequency."""
+"""`Scenes`: statistics of pictures, as brightness, contrast and power over frequency."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -74,7 +74,7 @@ class Scenes:
 
     @classmethod
     def of(cls, pictures: Sequence[Any], pitch: float, samples: int = 32) -> "Scenes":
-        """As pictures are: contrast and power of all their squares of so many samples, in the mean.
+        """Scenes with the mean contrast and power of all squares of so many samples in some pictures.
 
         Squares overlap by half, and fade out towards their borders.
 
@@ -108,7 +108,7 @@ class Scenes:
 
     @property
     def size(self) -> float:
-        """Across the square [m]."""
+        """Width of the square [m]."""
         return self.samples * self.pitch
 
     @property

@@ -1,4 +1,4 @@
-"""`slopes`: how a bound changes with the instrument, for searches that go downhill.
+"""`slopes`: derivatives of a bound by an instrument's parts, for gradient searches.
 
 One run backwards through the images gives what a bound changes by as the waves on the lenslets, and what
 these do to light, change; how these change with a key of the camera file is cheap.
@@ -80,7 +80,7 @@ def slopes(
     ------
     GeometryError
         Another instrument, another number of lenslets or of those before the pixels, a sensor that differs by
-        more than its pixels' optics, or a bound that raw images do not tell.
+        more than its pixels' optics, or a bound that raw images do not determine.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def slopes(
             seen, back = some.lit(number)
             found, by = _variance(seen, scope.sensor, light, PARTS[name])
             if not math.isfinite(found):
-                raise GeometryError(f"raw images do not tell {name} at {dz:g} m. Leave that depth out.")
+                raise GeometryError(f"raw images do not determine {name} at {dz:g} m. Leave that depth out.")
             back(by)
             variance += found
         total += some.along()
@@ -109,7 +109,7 @@ def slopes(
 
 
 def _variance(seen: np.ndarray, sensor: Sensor, light: Light, part: slice) -> tuple[float, np.ndarray]:
-    """Mean variance of what is asked, and its slopes (4, ny, nx) by a point's parts of the light."""
+    """Mean variance of the bound, and its slopes (4, ny, nx) by a point's parts of the light."""
     known, noise = Seen.of(sensor, light, seen), reading(sensor)
     if not np.isfinite(deviations(known.fisher)[part]).all():
         return math.inf, np.zeros_like(seen)

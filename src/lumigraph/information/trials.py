@@ -1,4 +1,4 @@
-"""`trials`: where points are found in drawn noise, by the most likely place: what a bound is worth."""
+"""`trials`: errors of the most likely places of points in drawn noise, to check the bounds."""
 
 from dataclasses import dataclass
 
@@ -13,13 +13,13 @@ from lumigraph.instruments.instrument import Instrument
 from lumigraph.sensor import Sensor
 
 REACH = 5.0
-"""How far from the truth places are looked for, in bounds."""
+"""Distance from the truth within which places are searched, in bounds."""
 
 NODES = 5
 """Places along each axis at which images are known; between, polynomials of this many terms."""
 
 STEPS, SMALL = 25, 1e-3
-"""Of Fisher's scoring, at most; and of which length, in bounds, they end."""
+"""Steps of Fisher's scoring, at most, and the length, in bounds, at which they end."""
 
 DARK = 1e-7
 """Pixels that get less light than this, of the brightest, are left out."""
@@ -84,7 +84,7 @@ def trials(
     Raises
     ------
     GeometryError
-        A place whose raw image does not tell where it is.
+        If the raw image does not determine the place.
     """
     light = Light() if light is None else light
     at = np.array([checks.finite("place", v) for v in place])
@@ -94,7 +94,9 @@ def trials(
     first = points.lit(at, checked=True)[0]
     told = deviations(Seen.of(sensor, light, first).fisher)
     if not np.isfinite(told).all():
-        raise GeometryError(f"a raw image does not tell where a point at {place} is. Use more photons.")
+        raise GeometryError(
+            f"a raw image does not determine the place of a point at {place}. Use more photons."
+        )
     between = _Between.of(points, at, told[:3])
     mean = expected(sensor, light, between.at(np.zeros(3)))[0]
     errors = []
@@ -121,7 +123,7 @@ class _Between:
 
     @classmethod
     def of(cls, points: Source, at: np.ndarray, steps: np.ndarray) -> "_Between":
-        """Of a point's images at steps from a place."""
+        """Polynomials through a point's images at steps from a place."""
         nodes = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES) * REACH
         memory.require(
             8.0 * points.pixels * NODES**3, "images around the place", "Use fewer pixels.", SamplingError

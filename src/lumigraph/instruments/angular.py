@@ -1,4 +1,4 @@
-"""How pixels respond to the angle of light, as a table of a camera file."""
+"""Angular response of pixels, as a table of a camera file."""
 
 from pydantic import model_validator
 
@@ -40,7 +40,7 @@ class Angles(Part):
         return self
 
     def response(self) -> AngularResponse:
-        """What the sensor takes."""
+        """Angular response for the sensor."""
         return AngularResponse(self.power, self.angles, self.values)
 
 

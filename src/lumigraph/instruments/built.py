@@ -1,4 +1,4 @@
-"""Where the parts of a camera stand as built, table ``[built]``, if not where its description puts them."""
+"""Deviations of a camera's parts from its description, as built: table ``[built]``."""
 
 import math
 
@@ -11,7 +11,7 @@ from lumigraph.instruments.quantities import Angle, Displacement, Length, NotNeg
 
 
 class Built(Part):
-    """A camera as it was built: other distances than described, lenslets that differ, planes that lean.
+    """A camera as built: distances other than described, lenslets that differ, tilted planes.
 
     The object stays at `object_distance`, in focus or not.
 
@@ -25,7 +25,7 @@ class Built(Part):
         By how much lenslets, and pixels, stand farther from the main lens along y and along x: two angles,
         about the axis, in physical coordinates; a raw image shows them turned by 180°.
     array_bow
-        How much farther the lenslets at the array's corners stand than the middle; it grows with the square
+        Distance by which lenslets at the array's corners are behind the middle; it grows with the square
         of the distance from the axis.
     focal_length_scatter
         Standard deviation of single lenslets' focal lengths, as a part of them.
@@ -37,9 +37,9 @@ class Built(Part):
         Standard deviation of the angles by which their surfaces are tilted about their vertices, along each
         axis. A sphere that is tilted by θ turns light by (n - 1) θ; n is the `index` of the lenslets.
     form_scatter
-        Of the path through them, what neither focus nor tilt describes: its rms.
+        Rms form error of the path through lenslets, without focus and tilt.
     seed
-        Of which lenslet is how.
+        Seed of the random differences.
 
     Examples
     --------
@@ -60,7 +60,7 @@ class Built(Part):
     seed: Seed = 0
 
     def scatter(self, index: float | None = None) -> Scatter | None:
-        """How single lenslets of a refractive index differ; None where they are alike.
+        """Scatter of single lenslets of a refractive index; None if all are alike.
 
         Raises
         ------
@@ -79,7 +79,7 @@ class Built(Part):
         return None if found == Scatter(seed=self.seed) else found
 
     def lean(self, corner: float) -> Lean | None:
-        """Of array and sensor, whose corners are so far from the axis [m]; None where none leans.
+        """Tilt and bow of array and sensor, whose corners are `corner` from the axis [m]; None without any.
 
         Raises
         ------

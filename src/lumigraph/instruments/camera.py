@@ -1,4 +1,4 @@
-"""What all cameras have in common: distances, grids and trains."""
+"""Base of all cameras: distances, grids and trains."""
 
 import math
 import warnings
@@ -63,7 +63,7 @@ class Camera(Instrument):
 
     @cached_property
     def exit_pupil(self) -> ExitPupil:
-        """Where its light comes from: of a thin lens the lens, of a prescription as its glass has it.
+        """Exit pupil: of a thin lens the lens itself, of a prescription that of its glass.
 
         Raises
         ------
@@ -85,34 +85,34 @@ class Camera(Instrument):
 
     @property
     def object_scale(self) -> float:
-        """Size in the focused plane of what is 1 in the lenslet plane, z1/L before a thin lens."""
+        """Scale from the lenslet plane to the focused plane, z1/L before a thin lens."""
         if not self.exit_pupil.behind:
             return self.object_distance / self.separation
         return self.exit_pupil.to_image / self.magnification / self.pupil_distance
 
     @property
     def lattice(self) -> Lattice | None:
-        """Where the lenslets stand [m], in physical coordinates; None without lenslets."""
+        """Lattice of the lenslets [m], in physical coordinates; None without lenslets."""
         return None
 
     @property
     def pupil_diameter(self) -> float:
-        """Of the main lens' stop, D [m]."""
+        """Diameter D of the main lens' stop [m]."""
         raise NotImplementedError
 
     @property
     def path_difference(self) -> float:
-        """To ten rings of an Airy disc, 10 λ [m]."""
+        """Largest path difference, to ten rings of an Airy disc, 10 λ [m]."""
         return 10 * self.wavelength
 
     @property
     def f_number(self) -> float:
-        """Of the main lens at its image, z2 / D."""
+        """F-number of the main lens at its image, z2 / D."""
         return resolution.f_number(self.image_distance, self.pupil_diameter)
 
     @cached_property
     def sampling(self) -> Sampling:
-        """How finely the planes must be sampled, and are."""
+        """Required and actual sampling of the planes."""
         raise NotImplementedError
 
     @property
@@ -125,7 +125,7 @@ class Camera(Instrument):
 
     @property
     def object_grid(self) -> Grid:
-        """Samples of the focused plane that the sensor sees."""
+        """Grid of the focused plane within the field of the sensor."""
         return self.sampling.object_grid
 
     @property
@@ -181,7 +181,7 @@ class Camera(Instrument):
 
     @cached_property
     def glass(self) -> Glass | None:
-        """What the rays of the main lens' prescription say, at this camera's distances; None without one.
+        """Ray-traced properties of the main lens' prescription at this camera's distances; None without one.
 
         Raises
         ------
@@ -196,24 +196,24 @@ class Camera(Instrument):
         return None if path is None else glass(path, self._wanted)
 
     def at_wavelength(self, wavelength: float) -> Self:
-        """The same in light of another wavelength [m]: glass stays where its own brings it to focus."""
+        """Camera at another wavelength [m]; glass stays focused for its own wavelength."""
         other = self._in_light_of(wavelength)
         if self.main_lens.prescription is not None:
             vars(other).update(exit_pupil=self.exit_pupil, glass=self.glass, traced=self.traced)
         return other
 
     def _in_light_of(self, wavelength: float) -> Self:
-        """With another wavelength [m], and what follows from it but for the main lens."""
+        """Camera at another wavelength [m]; what follows from it changes, except for the main lens."""
         return self.replace(wavelength=wavelength)
 
     @cached_property
     def traced(self) -> Traced | None:
-        """What chief rays of a prescription say; None without one."""
+        """Chief rays of a prescription; None without one."""
         return None if self.glass is None else traced(self.glass, self.exit_pupil, self.object_distance)
 
     @property
     def _wanted(self) -> Wanted:
-        """What it asks of its glass."""
+        """Requirements on the glass."""
         return Wanted(
             self.wavelength, self.object_distance, self.main_lens.focal_length, self.pupil_diameter,
             math.hypot(*self.sampling.object_half) / self.object_distance,
@@ -250,7 +250,7 @@ class Camera(Instrument):
         return ()
 
     def depth_reach(self) -> float:
-        """A third of the way to the focal length."""
+        """A third of the distance from the focused plane to the focal length [m]."""
         return 0.3 * (self.object_distance - self.main_lens.focal_length)
 
     def point_view(self, dz: float = 0.0) -> PointImage:
@@ -265,11 +265,11 @@ class Camera(Instrument):
         samples_per_lenslet: int | None = None,
         progress: Progress | None = None,
     ) -> Linear:
-        """The operator of its own pixels, wherever a raw image's lenslets stand."""
+        """Operator of the described pixels, whatever the calibration of a raw image."""
         return self.operator(depths, samples_per_lenslet, progress=progress)
 
     def magnifications(self) -> Range:
-        """Of the main lens, by the distance of the object."""
+        """Magnifications of the main lens, varied by the object's distance."""
         focal_length, own = self.main_lens.focal_length, self.magnification
         return Range(
             "z2/z1, of the main lens", own, (own / 5, own * 5),
@@ -277,7 +277,7 @@ class Camera(Instrument):
         )  # fmt: skip
 
     def optics(self) -> CameraOptics:
-        """What operators read of the camera, as plain values."""
+        """Plain values of the camera, which operators read."""
         for text in describe_glass.warnings(self):
             warnings.warn(text, ParaxialWarning, stacklevel=2)
         thin = CameraOptics(
@@ -303,7 +303,7 @@ class Camera(Instrument):
         progress: Progress | None = None,
         spectrum: Spectrum | None = None,
     ) -> Linear:
-        """The exact model of how this camera sees incoherent planes, for `lumigraph.deconvolve`.
+        """Exact operator of this camera for incoherent planes, for `lumigraph.deconvolve`.
 
         Parameters
         ----------
@@ -322,7 +322,7 @@ class Camera(Instrument):
         progress
             Called as ``progress(fraction)``.
         spectrum
-            Of one channel, in the place of the camera's wavelength.
+            Spectrum of one channel, in place of the camera's wavelength.
 
         Raises
         ------
@@ -358,7 +358,7 @@ class Camera(Instrument):
         accuracy: float = 1e-3,
         progress: Progress | None = None,
     ) -> Linear:
-        """As `operator`, of an object on any grid, such as one that was moved."""
+        """Operator as of `operator`, for an object on any grid, such as one that was moved."""
         planes = None if depths is None else self._depths(depths)
         return self._planes(self.optics(), planes, grid, Making(accuracy, None, progress))
 

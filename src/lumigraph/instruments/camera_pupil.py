@@ -56,7 +56,7 @@ def pupil_images(
 
 
 def _require_alike(camera: LensletCamera, accuracy: float) -> None:
-    """Refuse what is not the same before all lenslets of a square lattice."""
+    """Refuse a camera that is not the same before all lenslets of a square lattice."""
     parts, told = camera.lenslets, "derivatives by the pupil's phase"
     if parts.layout != "square" or parts.rotation:
         raise GeometryError(f"{told} need lenslets in rows and columns along the sensor's.")

@@ -1,4 +1,4 @@
-"""What only some kinds of instruments can do, by their methods: ``isinstance(camera, Decoded)``."""
+"""Abilities of some kinds of instruments, as protocols: ``isinstance(camera, Decoded)``."""
 
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
@@ -13,7 +13,7 @@ from lumigraph.operators.microscope_pupil import PupilImages
 
 @runtime_checkable
 class Decoded(Protocol):
-    """Its raw images are decoded into views, which are refocused by a factor."""
+    """Instruments whose raw images are decoded into views, which are refocused by a factor."""
 
     def refocus_factor(self, dz: float, separation: float) -> float:
         """α' that focuses views of a separation [m] at a depth `dz` [m] from the focused plane."""
@@ -22,7 +22,7 @@ class Decoded(Protocol):
 
 @runtime_checkable
 class Correctable(Protocol):
-    """The bias of a measure of depth can be found on planes whose depth is known."""
+    """Instruments whose bias of depth can be measured on planes of known depth."""
 
     def plane_views(self, alpha: float) -> LightField:
         """Views of a textured plane at a refocus factor."""
@@ -31,11 +31,11 @@ class Correctable(Protocol):
 
 @runtime_checkable
 class WithPupil(Protocol):
-    """Images of points are known as functions of its pupil's phase."""
+    """Instruments whose images of points are functions of the pupil's phase."""
 
     @property
     def configuration(self) -> str:
-        """Where the lenslets stand."""
+        """Position of the lenslets: "1.0", "2.0" or "fourier"."""
         ...
 
     def pupil_images(self, terms: Sequence[int]) -> PupilImages:
@@ -45,7 +45,7 @@ class WithPupil(Protocol):
 
 @runtime_checkable
 class Rendered(Protocol):
-    """Its raw images are rendered from a patch of each micro-image."""
+    """Instruments whose raw images are rendered from a patch of each micro-image."""
 
     def patch_at(self, dz: float) -> float:
         """Patch [px] that tiles the picture of an object at a depth `dz` [m] from the focused plane."""
@@ -58,17 +58,17 @@ class Rendered(Protocol):
 
 @runtime_checkable
 class WithLenslets(Protocol):
-    """Its object is sampled by lenslets."""
+    """Instruments whose object is sampled by lenslets."""
 
     @property
     def lenslet_size(self) -> float:
-        """Of a lenslet in the focused plane [m]."""
+        """Size of a lenslet in the focused plane [m]."""
         ...
 
 
 @runtime_checkable
 class WithMainLens(Protocol):
-    """A main lens forms its image: depths follow from the lens equation."""
+    """Instruments with a main lens: depths follow from the lens equation."""
 
     main_lens: MainLens
     object_distance: float
@@ -80,7 +80,7 @@ class WithMainLens(Protocol):
 
 @runtime_checkable
 class WithDepth(Protocol):
-    """What is found behind its lenslets has a depth that follows from the lens equation."""
+    """Instruments whose disparities become depths by the lens equation."""
 
     main_lens: MainLens
 
@@ -89,13 +89,13 @@ class WithDepth(Protocol):
         ...
 
     def object_to_pupil(self) -> float:
-        """From the focused plane to where the lens sees it from [m]."""
+        """Distance from the focused plane to the entrance pupil [m]."""
         ...
 
 
 @runtime_checkable
 class WithObjective(Protocol):
-    """An objective forms its image: depths are small and go with the refocus factor."""
+    """Instruments with an objective: depths are small and proportional to the refocus factor."""
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
@@ -104,7 +104,7 @@ class WithObjective(Protocol):
 
     @property
     def in_pupil(self) -> bool:
-        """Whether lenslets stand in the pupil, so that each micro-image is a view."""
+        """True if lenslets stand in the pupil, so that each micro-image is a view."""
         ...
 
     def depth_per_alpha(self, separation: float) -> float:

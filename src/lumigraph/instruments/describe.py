@@ -224,7 +224,7 @@ def _singles(camera: "LensletCamera") -> Iterator[Row]:
 
 
 def _glass(camera: "LensletCamera") -> Iterator[Row]:
-    """Of lenslets with a surface, or whose focal length changes with the wavelength."""
+    """Rows on lenslets with a surface, or whose focal length changes with the wavelength."""
     parts, surface = camera.lenslets, camera.lenslets.surface(camera.wavelength)
     if parts.abbe is not None:
         yield Row("lenslet Abbe number", parts.abbe, "", "V_d, given")
@@ -251,7 +251,7 @@ def _sensor(camera: "Camera") -> Iterator[Row]:
 
 
 def readout(sensor: Sensor) -> Iterator[Row]:
-    """What the sensor makes of photons, by EMVA 1288's model."""
+    """Rows on the sensor by EMVA 1288's model: photons to digital numbers."""
     noise = 3 * sensor.dark_noise / sensor.gain
     if sensor.fill_factor < 1:
         yield Row("pixel fill factor", sensor.fill_factor, "", "active width / pitch, given")
@@ -351,6 +351,6 @@ def _smallest(camera: "LensletCamera") -> float:
 def _cropped(camera: "LensletCamera") -> Iterator[str]:
     seen, present = len(camera.calibration.indices), len(camera.lenslets.indices())
     if seen < present:
-        yield f"the sensor shows {seen} micro-image centres of {present}. Leave its shape out to see all."
+        yield f"the sensor shows {seen} micro-image centres of {present}. Leave its shape out to show all."
     if camera.lenslet_distance and max(camera.lenslets.reach) > camera.separation / 4:
         yield "the array is wide for its distance: rays beyond 14 degrees are not paraxial."

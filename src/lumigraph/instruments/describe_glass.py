@@ -1,4 +1,4 @@
-"""What a camera's table says about the glass of its main lens."""
+"""Rows of a camera's table on the glass of its main lens."""
 
 import math
 from collections.abc import Iterator
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from lumigraph.instruments.camera import Camera
 
 ROUND = 0.02
-"""How much narrower than round the stop may look without a warning."""
+"""Relative narrowing of the stop up to which there is no warning."""
 
 
 def rows(camera: "Camera") -> Iterator[Row]:
-    """Where the aberrations come from and how large they are; nothing without a prescription."""
+    """Rows on the source and size of the aberrations; none without a prescription."""
     glass = camera.glass
     if glass is None or camera.traced is None or camera.main_lens.prescription is None:
         return
@@ -49,7 +49,7 @@ def rows(camera: "Camera") -> Iterator[Row]:
 
 
 def warnings(camera: "Camera") -> Iterator[str]:
-    """What of the glass is not as its file has it, or not followed and would be seen."""
+    """Warnings where the glass differs from its file, or has visible effects that are not simulated."""
     glass = camera.glass
     if glass is None:
         return

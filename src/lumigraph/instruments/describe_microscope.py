@@ -58,7 +58,7 @@ def _lenslets(scope: "LightFieldMicroscope") -> Iterator[Row]:
         yield Row("matched f-number", matched, "", "M / (2 NA): micro-images touch")
     if scope.lenslet_offset is not None:
         yield Row("lenslet offset", scope.lenslet_offset, "m", "native image to lenslets, given")
-    yield Row("lenslet distance", scope.lenslet_distance, "m", "b, lenslets to the plane the sensor sees")
+    yield Row("lenslet distance", scope.lenslet_distance, "m", "b, lenslets to the sensor's conjugate plane")
 
 
 def _reconstruction(scope: "LightFieldMicroscope") -> Iterator[Row]:

@@ -28,7 +28,7 @@ from lumigraph.sensor import Sensor
 
 
 class DescribedMicroscope(Instrument):
-    """What a microscope's description says and where its parts stand; see `LightFieldMicroscope`."""
+    """Description of a microscope and positions of its parts; see `LightFieldMicroscope`."""
 
     wavelength: Wavelength
     objective: MicroscopeObjective
@@ -85,21 +85,21 @@ class DescribedMicroscope(Instrument):
 
     @property
     def magnification(self) -> float:
-        """From the object to the native image, M."""
+        """Magnification M from the object to the native image."""
         return self.objective.actual_magnification
 
     @property
     def lenslet_distance(self) -> float:
-        """Lenslets to the plane that the sensor sees, b [m]."""
+        """Distance b from lenslets to the plane imaged on the sensor [m]."""
         return self.sensor_distance or self.lenslets.focal_length[0]
 
     @property
     def path_difference(self) -> float:
-        """By both edges of a lenslet to a pitch from its middle, p²/b, or 10 λ [m]."""
+        """Path difference by both edges of a lenslet to a pitch from its middle, p²/b, or 10 λ [m]."""
         return max(10 * self.wavelength, self.lenslets.pitch**2 / self.lenslet_distance)
 
     def layout(self) -> MicroscopeLayout:
-        """What a ray diagram shows."""
+        """Layout for a ray diagram."""
         row = LensletLayout(self.lenslet_distance, self.lenslets.pitch, 0.0, self.lenslets.focal_length)
         aperture, tube = self.objective.numerical_aperture, self.objective.tube_focal_length
         offset = self.lenslet_offset or 0.0
@@ -112,13 +112,14 @@ class DescribedMicroscope(Instrument):
 
     @property
     def micro_image_pitch(self) -> float:
-        """Between micro-images on the sensor [m]."""
+        """Distance between micro-images on the sensor [m]."""
         return self.lenslets.pitch * self.relay_magnification
 
     @property
     def pupil_diameter(self) -> float:
-        """Of the pupil's image on the lenslets of a Fourier microscope, 2 f_F NA/M [m]; else the exit pupil's
-        per unit of distance from the native image, 2 NA/M.
+        """Diameter of the pupil's image on the lenslets of a Fourier microscope, 2 f_F NA/M [m].
+
+        Otherwise that of the exit pupil per unit of distance from the native image, 2 NA/M.
         """
         return 2 * self.objective.numerical_aperture / self.magnification * (self.fourier_lens or 1.0)
 
@@ -151,7 +152,7 @@ class DescribedMicroscope(Instrument):
 
     @property
     def lattice(self) -> Lattice:
-        """Where the lenslets stand [m]."""
+        """Lattice of the lenslets [m]."""
         return self.lenslets.lattice()
 
     @property
@@ -172,7 +173,7 @@ class DescribedMicroscope(Instrument):
 
     @property
     def in_pupil(self) -> bool:
-        """Whether lenslets stand in the pupil, so that each micro-image is a view."""
+        """True if lenslets stand in the pupil, so that each micro-image is a view."""
         return self.configuration == "fourier"
 
     @property
@@ -183,7 +184,7 @@ class DescribedMicroscope(Instrument):
 
     @cached_property
     def calibration(self) -> Calibration:
-        """Where the micro-images stand on the raw image [px], by geometry; only those inside the sensor."""
+        """Calibration of the raw image [px], by geometry; only micro-images inside the sensor."""
         sensor, pitch = self.sensor, self.sensor.pixel_pitch
         # Raw images are turned by 180°, and the lattice about the axis; behind a pupil they are not.
         sign = 1 if self.in_pupil else -1
@@ -212,7 +213,7 @@ class DescribedMicroscope(Instrument):
 
     @property
     def scene_grid(self) -> Grid:
-        """As fine as the objective resolves, up to three times finer than `object_grid`."""
+        """Grid as fine as the objective resolves, up to three times finer than `object_grid`."""
         grid = self.object_grid
         if self.configuration == "fourier":
             return grid

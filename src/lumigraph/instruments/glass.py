@@ -1,14 +1,8 @@
-r"""A main lens of glass: Zernike terms over field and wavelength, fitted to the rays of its prescription.
+"""A main lens of glass: Zernike terms over field and wavelength, fitted to the rays of its prescription.
 
-Light of a pupil point arrives at the image as a plane wave of direction cosines (l, m), whose phase at the
-image of the chief ray is 2π/λ times
-
-.. math:: \Phi(l, m) = s + (w_0 - w) \cdot (l, m) + \delta n,
-
-with the optical path s to the image plane, where the ray arrives at w, and a plane δ behind it. Summed over
-all directions that is the point's image, to the approximation of Huygens and Fresnel. The camera's own lens
-is thin, with the stop of diameter D in it and the image at z2: a direction is the place -z2 (l - l_0, m) of
-its stop, seen from the chief ray. There Φ is fitted, over the ellipse that the stop's rim is seen as.
+The path Φ(l, m) = s + (w_0 - w) · (l, m) + δ n of plane waves that arrive at the image is fitted over the
+ellipse as which the stop's rim appears, on the stop of the camera's thin lens. docs/theory/instruments.md
+derives it.
 """
 
 import hashlib
@@ -27,13 +21,13 @@ from lumigraph.io.prescription import FirstOrder, Prescription, Rays, content
 from lumigraph.store import cabinet
 
 VERSION = 1
-"""Of what is kept: another one forgets it."""
+"""Version of the cached arrays: another one discards them."""
 
 ORDER = 10
 """Highest radial order of the fit."""
 
 FIELDS = (9, 17, 33, 65)
-"""Fields from the axis to the farthest that are tried; every second one tells how well others are known."""
+"""Numbers of fields that are tried; every second field gives the error of the interpolation."""
 
 BETWEEN = 0.02
 """Waves rms that every second field may be off by, between the others: with all of them it is far less."""
@@ -42,10 +36,10 @@ UNFITTED = 0.05
 """Waves rms that the fit may leave."""
 
 SAME_FOCUS = 0.005
-"""How far, of it, the camera file's focal length may be from the prescription's."""
+"""Relative difference allowed between the focal lengths of camera file and prescription."""
 
 MARGIN = 1.05
-"""How much farther than the object's corner fields are traced."""
+"""Factor by which fields beyond the object's corner are traced."""
 
 VISIBLE = (400e-9, 700e-9)
 """Wavelengths that are traced at least where the glasses are known there [m]."""
@@ -58,7 +52,7 @@ TERMS = tuple(j for j in range(2, (ORDER + 1) * (ORDER + 2) // 2 + 1) if noll_to
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wanted:
-    """What a camera asks of its glass.
+    """Requirements of a camera on its glass.
 
     Parameters
     ----------
@@ -67,9 +61,9 @@ class Wanted:
     object_distance
         From the front principal plane [m].
     focal_length, diameter
-        Of the camera's thin lens [m].
+        Focal length and diameter of the camera's thin lens [m].
     reach
-        Farthest field that it sees, a tangent.
+        Farthest field of the camera, a tangent.
     """
 
     wavelength: float
@@ -80,28 +74,28 @@ class Wanted:
 
     @property
     def image_distance(self) -> float:
-        """Of the thin lens [m]."""
+        """Image distance of the thin lens [m]."""
         return thin_lens.image_distance(self.focal_length, self.object_distance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Glass:
-    """What the rays of a prescription say.
+    """Ray-traced properties of a prescription.
 
     Parameters
     ----------
     first_order
         At the camera's wavelength.
     aberrations, openings
-        Of the camera's plate.
+        Terms and openings of the camera's plate.
     entrance_pupil
         Diameter of what the camera uses [m].
     defocus
         From the paraxial image to the plane of the least rms wavefront on the axis, positive behind [m].
     moved
-        Of the fields, how far chief rays arrive from the thin lens' image, positive outwards [m].
+        Distances of the fields' chief rays from the thin lens' image, positive outwards [m].
     turned
-        Of the fields, directions of the pupil's middle from the thin lens' [rad], positive outwards.
+        Directions of the pupil's middle from the thin lens', for the fields [rad], positive outwards.
     left
         Rms path that the fit leaves at worst [m].
     between
@@ -110,7 +104,7 @@ class Glass:
     rim
         Farthest place of the stop's rim from its ellipse, over the radius.
     notes
-        What of the file was not used.
+        Parts of the file that were not used.
     """
 
     first_order: FirstOrder
@@ -132,7 +126,7 @@ class Glass:
 
 
 def first_order(path: Path, wavelength: float) -> FirstOrder:
-    """What a prescription is to first order at a wavelength [m]; errors as of `glass`."""
+    """First-order properties of a prescription at a wavelength [m]; errors as of `glass`."""
     return _first_order(path, hashlib.sha256(content(path)).hexdigest(), wavelength)
 
 
@@ -151,7 +145,7 @@ def _first_order(path: Path, digest: str, wavelength: float) -> FirstOrder:
 
 
 def _version() -> str:
-    """Optiland's."""
+    """Version of Optiland."""
     try:
         return metadata.version("optiland")
     except metadata.PackageNotFoundError:
@@ -159,7 +153,7 @@ def _version() -> str:
 
 
 def glass(path: Path, wanted: Wanted) -> Glass:
-    """Of a prescription, for a camera; what was traced once is kept.
+    """Ray-traced properties of a prescription for a camera; cached.
 
     Raises
     ------
@@ -238,7 +232,7 @@ def _enough(lens: Prescription, wanted: Wanted, wavelengths: np.ndarray) -> tupl
 
 
 def _check_wavelength(lens: Prescription, own: float) -> tuple[float, float]:
-    """From where to where all glasses are known [m], where the camera's own wavelength is among them."""
+    """Range of wavelengths in which all glasses are known [m]; the camera's own must lie in it."""
     low, high = lens.wavelengths()
     if not low <= own <= high:
         raise GeometryError(
@@ -343,7 +337,7 @@ def _cosine(rays: Rays) -> np.ndarray:
 
 
 def _at_chief(rays: Rays, defocus: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of the fields: where chief rays meet a plane behind the image's, their cosines and slopes."""
+    """Heights where the fields' chief rays meet a plane behind the image's, their cosines and slopes."""
     chief = rays.along[:, 0]
     slope = chief / _cosine(rays)[:, 0]
     return rays.height[:, 0] + defocus * slope, chief, slope
@@ -356,7 +350,7 @@ def _path(rays: Rays, heights: np.ndarray, defocus: float) -> np.ndarray:
 
 
 def _places(rays: Rays, chief: np.ndarray, wanted: Wanted) -> tuple[np.ndarray, np.ndarray]:
-    """Of the thin lens' stop, along and across the field, over its radius."""
+    """Positions of rays in the thin lens' stop, along and across the field, over its radius."""
     scale = -2 * wanted.image_distance / wanted.diameter
     return scale * (rays.along - chief[:, None]), scale * rays.across
 
@@ -373,7 +367,7 @@ def _best_focus(rays: Rays, wanted: Wanted) -> float:
 
 
 def _ellipses(places: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Centre along the field and half axes (fields, 3) of what the stop's rim is seen as."""
+    """Centre along the field and half axes (fields, 3) of the ellipse as which the stop's rim appears."""
     found = np.array([_ellipse(*rim) for rim in zip(*(each[:, -_ANGLES:] for each in places), strict=True)])
     found[0, 0] = 0.0
     found[0, 1:] = found[0, 1:].mean()

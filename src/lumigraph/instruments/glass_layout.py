@@ -1,4 +1,4 @@
-"""What a ray diagram shows of a main lens of glass: its surfaces, and rays through them."""
+"""Ray diagram of a main lens of glass: its surfaces, and rays through them."""
 
 import hashlib
 from functools import lru_cache
@@ -11,13 +11,13 @@ from lumigraph.instruments.glass import Wanted, glass
 from lumigraph.io.prescription import Prescription, content
 
 FIELD = 0.75
-"""Of the farthest field, from which the second bundle comes."""
+"""Part of the farthest field, from which the second bundle comes."""
 
 _PUPIL = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 
 
 def glass_layout(path: Path, wanted: Wanted) -> GlassLayout:
-    """Of a prescription, as a camera has it.
+    """Layout of a prescription as a camera uses it.
 
     Raises
     ------

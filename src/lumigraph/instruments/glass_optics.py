@@ -1,4 +1,4 @@
-"""A camera's optics behind glass: the thin lens that stands in its exit pupil, and what it sees."""
+"""A camera's optics behind glass: the thin lens in its exit pupil, and object space before it."""
 
 from dataclasses import dataclass, replace
 
@@ -12,14 +12,14 @@ from lumigraph.operators import CameraOptics
 
 @dataclass(frozen=True, slots=True)
 class ExitPupil:
-    """Where light comes from behind a lens, and how objects stand before a thin lens there.
+    """Exit pupil of a lens, and object distances before a thin lens placed there.
 
     Parameters
     ----------
     behind
         From the rear principal plane, positive behind [m]; 0 of a thin lens.
     focal_length, image_distance
-        Of the camera's thin lens, f and z2 [m].
+        Focal length f and image distance z2 of the camera's thin lens [m].
     """
 
     behind: float
@@ -28,26 +28,26 @@ class ExitPupil:
 
     @property
     def magnification(self) -> float:
-        """Its width over the entrance pupil's, m_p = 1 - e'/f."""
+        """Pupil magnification, its width over the entrance pupil's, m_p = 1 - e'/f."""
         return 1 - self.behind / self.focal_length
 
     @property
     def to_image(self) -> float:
-        """To the main lens' image, z2 - e' [m]."""
+        """Distance to the main lens' image, z2 - e' [m]."""
         return self.image_distance - self.behind
 
     @property
     def wider(self) -> float:
-        """Its width over the thin lens' of the same aperture at the image."""
+        """Width over that of the thin lens with the same aperture at the image."""
         return self.to_image / self.image_distance
 
     @property
     def object_distance(self) -> float:
-        """From the focused plane, as the thin lens of focal length m_p f there has it [m]."""
+        """Distance of the focused plane from a thin lens of focal length m_p f there [m]."""
         return 1 / (1 / (self.magnification * self.focal_length) - 1 / self.to_image)
 
     def to(self, separation: float) -> float:
-        """To a plane at a distance from the rear principal plane [m]."""
+        """Distance to a plane `separation` behind the rear principal plane [m]."""
         return separation - self.behind
 
     def check(self, name: str, separation: float) -> None:
@@ -70,16 +70,16 @@ class ExitPupil:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Traced:
-    """What chief rays say, over the fields that the thin lens in the exit pupil sees.
+    """Chief rays over the fields of the thin lens in the exit pupil.
 
     Parameters
     ----------
     fields
         Tangents of images' heights over the pupil's distance.
     objects
-        What that lens sees of objects.
+        Object space of that lens.
     lean
-        By how much chief rays are steeper than from the exit pupil's middle on the axis [rad], outwards.
+        Extra inclination of chief rays over those from the exit pupil's middle on the axis [rad], outwards.
     """
 
     fields: tuple[float, ...]
@@ -87,12 +87,12 @@ class Traced:
     lean: np.ndarray
 
     def leans(self, field: np.ndarray) -> np.ndarray:
-        """At fields, tangents [rad]."""
+        """Inclination of chief rays at fields, tangents [rad]."""
         return np.interp(field, self.fields, self.lean)
 
 
 def traced(glass: Glass, pupil: ExitPupil, object_distance: float) -> Traced:
-    """Of a lens at a distance from the focused plane [m]."""
+    """Chief rays of a lens at a distance from the focused plane [m]."""
     at = np.array(glass.aberrations.x)
     height = pupil.image_distance * at
     stretch = np.append(1.0, 1 + glass.moved[1:] / height[1:])

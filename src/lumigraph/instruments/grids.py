@@ -1,4 +1,4 @@
-"""Which grids a camera's simulation needs: the rules, each with its source, and the windows."""
+"""Grids of a camera's simulation: the sampling rules, each with its source, and the windows."""
 
 import math
 from dataclasses import dataclass
@@ -9,10 +9,10 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError
 
 MARGIN = 2.0
-"""By this factor grids are finer than the rules for lens phases and intensities ask."""
+"""Factor by which grids are finer than the rules for lens phases and intensities require."""
 
 ANGLE_MARGIN = 1.1
-"""By this factor grids are finer than the steepest ray asks: depths differ a little in angle."""
+"""Factor by which grids are finer than the steepest ray requires: depths differ a little in angle."""
 
 BORDER = 4
 """Samples left free around the stop, the lenslets and the sensor."""
@@ -37,9 +37,9 @@ class Sampling:
     Parameters
     ----------
     rules
-        What the pitch of pupil, lenslets and sensor must obey.
+        Rules for the pitch of pupil, lenslets and sensor.
     pitch
-        Of pupil, lenslets and sensor [m].
+        Pitch of pupil, lenslets and sensor [m].
     object_rules, object_pitch
         The same in the focused plane.
     object_half, pupil_half, lenslet_half, image_half
@@ -104,9 +104,9 @@ def plane_rules(
     Parameters
     ----------
     wavelength, focal_length, diameter
-        Of the light; of the main lens [m].
+        Wavelength; focal length and diameter of the main lens [m].
     f_number
-        Of the light on the sensor.
+        F-number of the light on the sensor.
     steepest
         Largest slope of a ray behind the lenses.
     """
@@ -125,11 +125,11 @@ def object_rules(
     Parameters
     ----------
     wavelength, distance, diameter
-        Of the light; object to main lens, z1; of the stop, D [m].
+        Wavelength; object to main lens, z1; diameter D of the stop [m].
     half_field
         Half width of the object, X [m].
     pitch
-        Of the pupil's samples [m].
+        Pitch of the pupil's samples [m].
     """
     half_window = _samples(diameter / 2, pitch) * pitch / 2
     return (

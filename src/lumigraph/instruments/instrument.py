@@ -28,7 +28,7 @@ from lumigraph.sensor import Sensor
 
 
 class Instrument(Part):
-    """What a camera file describes; see its children.
+    """Base of everything that a camera file describes; see its children.
 
     The protocols of `instruments.capabilities` say what only some kinds can do. What raises
     NotImplementedError here, every kind has in its own way.
@@ -38,17 +38,17 @@ class Instrument(Part):
 
     @property
     def noun(self) -> str:
-        """What it is called in messages: its kind in camera files."""
+        """Name in messages: its kind in camera files."""
         return self.KIND
 
     @property
     def sensor(self) -> Sensor:
-        """Its pixels."""
+        """Sensor: the pixels."""
         raise NotImplementedError
 
     @property
     def pupil_diameter(self) -> float:
-        """Of what limits the light [m]."""
+        """Diameter of the stop that limits the light [m]."""
         raise NotImplementedError
 
     @property
@@ -63,7 +63,7 @@ class Instrument(Part):
 
     @cached_property
     def calibration(self) -> Calibration | None:
-        """Where the micro-images stand on the raw image [px]; None without lenslets."""
+        """Calibration of the raw image [px]; None without lenslets."""
         return None
 
     @property
@@ -73,7 +73,7 @@ class Instrument(Part):
 
     @property
     def pupil_distance(self) -> float | None:
-        """Where its light comes from, to lenslets, L' [m]: `separation` but behind lenses of glass."""
+        """Distance L' of the exit pupil from the lenslets [m]: `separation`, except behind glass."""
         return self.separation
 
     @property
@@ -87,11 +87,11 @@ class Instrument(Part):
         return None
 
     def layout(self) -> Layout | MicroscopeLayout:
-        """What a ray diagram shows."""
+        """Layout for a ray diagram."""
         raise NotImplementedError
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """What can be changed of it by sliders, at its values."""
+        """Parameters that sliders can change, at their values."""
         raise NotImplementedError
 
     def changed(self, values: Mapping[str, Any] | None) -> Self:
@@ -108,11 +108,11 @@ class Instrument(Part):
         return self.replace(**found) if found else self
 
     def _count(self) -> tuple[int, int] | None:
-        """Of its lenslets; None without them."""
+        """Number of lenslets (rows, columns); None without them."""
         return None
 
     def depth_reach(self) -> float:
-        """How far from the focused plane a point is worth a look [m]."""
+        """Useful range of depths to either side of the focused plane [m]."""
         raise NotImplementedError
 
     def point_view(self, dz: float = 0.0) -> PointImage:
@@ -128,7 +128,7 @@ class Instrument(Part):
         raise NotImplementedError
 
     def check_accuracy(self, accuracy: float) -> None:
-        """Refuse what `operator` cannot be as exact as, before any work.
+        """Refuse an accuracy that `operator` cannot reach, before any work.
 
         Raises
         ------
@@ -146,11 +146,11 @@ class Instrument(Part):
         samples_per_lenslet: int | None = None,
         progress: Progress | None = None,
     ) -> Linear:
-        """The model of a raw image with that calibration, or, as the kind has none, of its own pixels."""
+        """Operator of a raw image with that calibration; of the described pixels for kinds without one."""
         raise NotImplementedError
 
     def would_be(self, share: float) -> str:
-        """What of the description would explain a lattice that is so many times as large as its own."""
+        """Change of the description that would explain a lattice `share` times as large as its own."""
         pitch = self.sensor.pixel_pitch
         return f"pixels of {pitch / share * 1e6:.4g} µm instead of {pitch * 1e6:.4g} µm"
 
@@ -214,16 +214,16 @@ class Instrument(Part):
         return self.describe().rows
 
     def trade_offs(self) -> tuple[Row, ...]:
-        """Those of the `quantities` that change with the magnification, to first order."""
+        """Rows of the `quantities` that change with the magnification, to first order."""
         raise NotImplementedError
 
     def magnifications(self) -> Range:
-        """Magnifications over which the trade-offs are worth a look."""
+        """Range of magnifications for the trade-offs."""
         raise NotImplementedError
 
     @property
     def path_difference(self) -> float:
-        """The largest between ways that meet in a point of the image and matter, to first order [m]."""
+        """Largest path difference of the light that meets in a point of the image, to first order [m]."""
         raise NotImplementedError
 
     def at_wavelength(self, wavelength: float) -> Self:

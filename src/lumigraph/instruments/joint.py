@@ -23,14 +23,14 @@ Shift = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Maker:
-    """What makes an operator of an object on any grid, and the grid of its own."""
+    """Factory of operators for an object on any grid, and its own grid."""
 
     grid: Grid
     on: Callable[[Grid], Linear]
 
     @classmethod
     def of(cls, operator: Linear) -> "Maker":
-        """Of an operator that knows its grid, brought onto others by resampling."""
+        """Factory from an operator that knows its grid, resampled onto others."""
         if operator.object_grid is None:
             raise GeometryError("the operator does not know where its object stands.")
         return cls(operator.object_grid, lambda grid: on_grid(operator, grid))
@@ -44,7 +44,7 @@ def scan(steps: int, period: float | Sequence[float]) -> np.ndarray:
     steps
         Along each axis.
     period
-        What is divided (y, x) [m]: a lenslet's pitch where the array moves, ``camera.lenslet_size`` where the
+        Divided period (y, x) [m]: a lenslet's pitch where the array moves, ``camera.lenslet_size`` where the
         object does.
 
     Raises
@@ -88,9 +88,9 @@ def joint_operator(
         As for ``camera.operator``. Depths count from the first camera's focused plane; main lenses stand at
         one place.
     shifts
-        By which the object was moved (k, 2) as (y, x) [m], one for each raw image; None where it was not.
+        Displacements of the object (k, 2) as (y, x) [m], one for each raw image; None where it did not move.
     grid
-        Of the object; None for the one described above.
+        Grid of the object; None for the one described above.
     progress
         Called as ``progress(fraction)``.
 
@@ -127,7 +127,7 @@ def joint_operator_for(
     samples_per_lenslet: int | None = None,
     progress: Progress | None = None,
 ) -> Joint:
-    """As `joint_operator`, of a real camera's pixels, as `Instrument.operator_for` has them."""
+    """Joint operator as of `joint_operator`, on a real camera's pixels as in `Instrument.operator_for`."""
     if isinstance(camera, Camera):
         return joint_operator(camera, depths, samples_per_lenslet, shifts=shifts, progress=progress)
     own = camera.operator_for(calibration, depths, samples_per_lenslet, progress)

@@ -1,4 +1,4 @@
-"""What plenoptic cameras 1.0 and 2.0 have in common."""
+"""Base of plenoptic cameras 1.0 and 2.0."""
 
 import math
 from collections.abc import Sequence
@@ -82,12 +82,12 @@ class LensletCamera(WithParts):
 
     @property
     def path_difference(self) -> float:
-        """By both edges of a lenslet to a pitch from its middle, p²/b, or 10 λ [m]."""
+        """Path difference by both edges of a lenslet to a pitch from its middle, p²/b, or 10 λ [m]."""
         return max(super().path_difference, self.lenslets.pitch**2 / self.lenslet_distance)
 
     @cached_property
     def lean(self) -> Lean | None:
-        """Of array and sensor as built; None where they are square to the axis."""
+        """Tilt and bow of array and sensor as built; None if they are square to the axis."""
         return self.built.lean(math.hypot(*self.lenslets.reach))
 
     @model_validator(mode="after")
@@ -97,13 +97,13 @@ class LensletCamera(WithParts):
 
     @property
     def scatter(self) -> Scatter | None:
-        """How single lenslets differ, as described and as built; None where they are alike."""
+        """Differences of single lenslets, as described and as built; None if all are alike."""
         errors, own = self.errors, self.lenslets.own()
         return replace(errors or Scatter(seed=self.built.seed), own=own) if own else errors
 
     @property
     def errors(self) -> Scatter | None:
-        """How single lenslets differ as built from those described; None where they do not."""
+        """Differences of single lenslets as built from those described; None if there are none."""
         return self.built.scatter(self.lenslets.index)
 
     @property
@@ -116,7 +116,7 @@ class LensletCamera(WithParts):
 
     @property
     def pupil_diameter(self) -> float:
-        """Of the main lens' stop, D [m]: as given, or matched to the lenslets."""
+        """Diameter D of the main lens' stop [m]: as given, or matched to the lenslets."""
         return self.main_lens.diameter or self.matched_diameter
 
     @property
@@ -126,7 +126,7 @@ class LensletCamera(WithParts):
 
     @property
     def lenslet_size(self) -> float:
-        """Of a lenslet in the focused plane, p z1/L [m]."""
+        """Size of a lenslet in the focused plane, p z1/L [m]."""
         return self.lenslets.pitch * self.object_scale
 
     @property
@@ -142,12 +142,12 @@ class LensletCamera(WithParts):
 
     @property
     def lattice(self) -> Lattice:
-        """Where the lenslets stand [m], in physical coordinates."""
+        """Lattice of the lenslets [m], in physical coordinates."""
         return self.lenslets.lattice()
 
     @cached_property
     def calibration(self) -> Calibration:
-        """Where the micro-images stand on the raw image [px], by geometry; only those inside the sensor.
+        """Calibration of the raw image [px], by geometry; only micro-images inside the sensor.
 
         The raw image is turned by 180°: lenslet (i, j) of the calibration is lenslet (-i, -j) of `lattice`,
         so that the second and third kind of a multi-focus array trade places.
@@ -172,7 +172,7 @@ class LensletCamera(WithParts):
         )  # fmt: skip
 
     def _traced_centers(self, centers: np.ndarray, indices: np.ndarray) -> np.ndarray:
-        """Of micro-images (k, 2) [px], whose chief rays do not come from the exit pupil's middle."""
+        """Centres of micro-images (k, 2) [px], shifted by the true inclination of their chief rays."""
         assert self.traced is not None  # asked by `calibration`
         places = self.lattice.position(-indices)
         away = np.hypot(*places.T)
@@ -182,7 +182,7 @@ class LensletCamera(WithParts):
         return centers - places * (aside / np.maximum(away, 1e-12))[:, None]
 
     def _leaning_centers(self, centers: np.ndarray, indices: np.ndarray) -> np.ndarray:
-        """Of micro-images (k, 2) [px], of lenslets that stand nearer to the sensor, or farther."""
+        """Centres of micro-images (k, 2) [px], of lenslets nearer to the sensor, or farther."""
         assert self.lean is not None  # asked by `calibration`
         y, x = self.lattice.position(-indices).T
         array, scale = self.lean.of_array(y, x), 1 + self.lenslet_distance / self.pupil_distance
@@ -226,7 +226,7 @@ class LensletCamera(WithParts):
         return self.wavelength * self.separation / (2 * self.pupil_diameter)
 
     def _in_light_of(self, wavelength: float) -> Self:
-        """Also with the focal length that lenslets of glass have, behind the same main lens and pixels."""
+        """Camera at another wavelength [m], with the focal length that lenslets of glass then have."""
         parts, same = self.lenslets, super()._in_light_of(wavelength)
         if parts.abbe is None:
             return same
@@ -238,18 +238,18 @@ class LensletCamera(WithParts):
         )  # fmt: skip
 
     def optics(self) -> CameraOptics:
-        """What operators read of the camera, as plain values."""
+        """Plain values of the camera, which operators read."""
         surface = self.lenslets.surface(self.wavelength)
         plain = replace(super().optics(), model=self.model, lean=self.lean, surface=surface)
         if self.lean is not None and self.model != "paraxial":
             raise GeometryError(
-                f'model is "{self.model}" but array or sensor lean, which the paraxial model follows alone. '
+                f'model is "{self.model}" but array or sensor is tilted: only the paraxial model has that. '
                 'Use model = "paraxial", or leave array_tilt, array_bow and sensor_tilt out of [built].'
             )
         if self.model == "exact" and self.main_lens.varies:
             raise GeometryError(
-                'model is "exact" but the main lens changes over the field, which the paraxial model follows '
-                'alone. Use model = "paraxial" or "auto", or leave over_field and prescription out.'
+                'model is "exact" but the main lens changes over the field, which only the paraxial model '
+                'follows. Use model = "paraxial" or "auto", or leave over_field and prescription out.'
             )
         if self.model == "exact" and not is_possible(plain):
             raise GeometryError(
@@ -283,7 +283,7 @@ class LensletCamera(WithParts):
 
     @cached_property
     def sampling(self) -> grids.Sampling:
-        """How finely the planes must be sampled, and are."""
+        """Required and actual sampling of the planes."""
         wavelength, diameter, pitch = self.wavelength, self.pupil_diameter, self.lenslets.pitch
         scale, reach = self.object_scale, self.lenslets.reach
         object_half = (reach[0] * scale, reach[1] * scale)
@@ -340,11 +340,11 @@ class LensletCamera(WithParts):
         Raises
         ------
         GeometryError
-            Array or sensor lean: elements stand in planes square to the axis.
+            Array or sensor is tilted: elements stand in planes square to the axis.
         """
         if self.lean is not None:
             raise GeometryError(
-                "the array or the sensor leans, where fields go from plane to plane. Simulate in "
+                "the array or the sensor is tilted, but fields go from plane to plane. Simulate in "
                 "Incoherent(), Coherent() or PartiallyCoherent() light, or leave array_tilt, array_bow and "
                 "sensor_tilt out of [built]."
             )
@@ -387,12 +387,12 @@ class LensletCamera(WithParts):
         return seen.replaced(values, "depth", 1 / scale)
 
     def object_to_pupil(self) -> float:
-        """From the focused plane to the entrance pupil, where perspective has its centre [m]."""
+        """Distance from the focused plane to the entrance pupil, the centre of perspective [m]."""
         return self.exit_pupil.object_distance / self.exit_pupil.magnification**2
 
 
 def _check_room(what: str, way: tuple[float, float], most: float, where: str) -> None:
-    """Refuse a way (y, x) that leads out of where there is room so far [m]."""
+    """Refuse an offset (y, x) beyond the room for it [m]."""
     if (far := max(map(abs, way))) > most * (1 + 1e-9) + 1e-15:
         raise GeometryError(
             f"{what} is {far * 1e6:.6g} µm but the {where} has room for {most * 1e6:.6g} µm. Use less, or "

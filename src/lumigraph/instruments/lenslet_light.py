@@ -24,30 +24,30 @@ FEWEST = 25
 """Lenslets."""
 
 NEAR = 2
-"""How far a lenslet's footprint is followed [lenslets]."""
+"""Distance to which a lenslet's footprint is followed [lenslets]."""
 
 INNER = 0.4
 """Half of the part of micro-images that counts, along each axis, in pitches: towards their rims they hold
 light of neighbours, which lenslets at the array's border lack."""
 
 ACCURACY, SPILT = 1e-2, 1e-2
-"""Of images, and of a lenslet's light what is followed from beyond the microscope's lenslets."""
+"""Accuracy of images, and part of a lenslet's light followed from beyond the microscope's lenslets."""
 
 Lensed = LensletCamera | LightFieldMicroscope
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensletLight:
-    """Which pixels are whose, and what they see of the object.
+    """Assignment of pixels to lenslets, and their images of the object.
 
     Parameters
     ----------
     labels, inner
         Number of the lenslet of each pixel (ny, nx), and how much of it counts, from 0 to 1.
     even
-        What each pixel shows of an even object (ny, nx).
+        Response of each pixel to an even object (ny, nx).
     places
-        Of the lenslets in the object (n, 2) [lenslets].
+        Positions of the lenslets in the object (n, 2) [lenslets].
     """
 
     labels: np.ndarray
@@ -58,7 +58,7 @@ class LensletLight:
 
     @classmethod
     def of(cls, camera: Lensed) -> "LensletLight":
-        """Of the camera's own pixels.
+        """Light of the lenslets on the camera's own pixels.
 
         Raises
         ------
@@ -68,7 +68,7 @@ class LensletLight:
         pixels = camera.calibration
         if len(pixels.indices) < FEWEST:
             raise CalibrationError(
-                f"the camera has {len(pixels.indices)} lenslets, but shifts are told by {FEWEST} or more."
+                f"the camera has {len(pixels.indices)} lenslets, but shifts need {FEWEST} or more."
             )
         operator, grid = _flat(camera)
         y, x = np.meshgrid(*(np.arange(n) for n in pixels.shape), indexing="ij")
@@ -103,12 +103,12 @@ class LensletLight:
         counts = (even > FAINT * np.median(even[even > 0])).all(0) if even.any() else np.zeros(0, bool)
         if counts.sum() < FEWEST:
             raise CalibrationError(
-                f"{counts.sum()} lenslets count in all raw images, but shifts are told by {FEWEST} or more."
+                f"{counts.sum()} lenslets count in all raw images, but shifts need {FEWEST} or more."
             )
         values, noise = light[:, counts] / even[:, counts], noise[:, counts] / even[:, counts] ** 2
         mean = float(values.mean())
         if not mean > 0:
-            raise CalibrationError("the raw images are dark: nothing tells how the object was moved.")
+            raise CalibrationError("the raw images are dark: shifts are unknown. Give more light.")
         noise = np.maximum(noise, 0.1 * noise.mean())
         return Part(values / mean, noise / mean**2, self.places[counts], self.textures)
 
@@ -137,7 +137,7 @@ class LensletLight:
 
 
 def _flat(camera: Lensed) -> tuple[Linear, Grid]:
-    """How it sees a flat object in focus that goes on beyond the lenslets, and the object's samples."""
+    """Operator of a flat object in focus that extends beyond the lenslets, and the object's grid."""
     if isinstance(camera, LensletCamera):
         grid = _beyond(camera.operator_grid(SAMPLES))
         return camera.operator_on(grid, accuracy=ACCURACY), grid
@@ -147,7 +147,7 @@ def _flat(camera: Lensed) -> tuple[Linear, Grid]:
 
 
 def _beyond(grid: Grid) -> Grid:
-    """An object that goes on beyond the lenslets, which sends some light there, too."""
+    """Grid of an object that extends beyond the lenslets, from where light spills, too."""
     height, width = (n + 2 * NEAR * SAMPLES for n in grid.shape)
     return Grid((height, width), grid.pitch, grid.center)
 
@@ -155,7 +155,7 @@ def _beyond(grid: Grid) -> Grid:
 def _places(
     indices: np.ndarray, middle: np.ndarray, grid: Grid, shown: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """Middles (n, 2) [m] of what lenslets see, each by its own light: neighbours' is not even at a border."""
+    """Centroids (n, 2) [m] of the lenslets' footprints in the object, each by its own light."""
     first = [_middle(shown((indices == middle + step).all(1)), grid) for step in ((0, 0), (1, 0), (0, 1))]
     steps = np.array(first[1:]) - first[0]
     places = first[0] + (indices - middle) @ steps
@@ -177,12 +177,12 @@ def _around(middle: int, reach: int) -> slice:
 
 
 def _middle(light: np.ndarray, grid: Grid) -> np.ndarray:
-    """Of its light, (y, x) [m]."""
+    """Centroid of the light (y, x) [m]."""
     return np.array([light.sum(1) @ grid.y, light.sum(0) @ grid.x]) / light.sum()
 
 
 def _near(light: np.ndarray) -> np.ndarray:
-    """What is near the brightest sample."""
+    """Part of the light near its brightest sample."""
     y, x = (round(float(n)) for n in np.argwhere(light > light.max() / 2).mean(0))
     reach = NEAR * SAMPLES
     return light[max(y - reach, 0) : y + reach, max(x - reach, 0) : x + reach]

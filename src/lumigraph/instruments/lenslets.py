@@ -28,24 +28,24 @@ from lumigraph.instruments.quantities import (
 MOST_LENSLETS = 2**20
 """Largest array: 1024 x 1024."""
 MOST_CHANGE = 0.5
-"""Of a single lenslet's focal length."""
+"""Largest change of a single lenslet's focal length."""
 MOST_INDEX = 4.0
-"""Of lenslets: germanium's."""
+"""Largest index of lenslets: germanium's."""
 MOST_CONIC = 100.0
-"""Of their surfaces, either way."""
+"""Largest conic constant of their surfaces, of either sign."""
 
 
 class OneLenslet(Part):
-    """What a lenslet has of its own, table ``[lenslets.single.N]``.
+    """Deviations of one lenslet, table ``[lenslets.single.N]``.
 
     Parameters
     ----------
     focal_change
-        By what part its focal length is longer than the array's: 0.03 is 3 % longer.
+        Relative change of its focal length: 0.03 is 3 % longer than the array's.
     offset_y, offset_x
-        Of it, aperture and all, from its place on the lattice.
+        Offset of the lenslet, aperture and all, from its place on the lattice.
     decentre_y, decentre_x
-        Of its vertex from the middle of its aperture, before a main lens.
+        Offset of its vertex from the middle of its aperture, before a main lens.
     """
 
     focal_change: Number = 0.0
@@ -56,17 +56,17 @@ class OneLenslet(Part):
 
     @property
     def vertex(self) -> tuple[float, float]:
-        """Way (y, x) to it from the place on the lattice [m]."""
+        """Offset (y, x) of the vertex from the place on the lattice [m]."""
         return self.offset_y + self.decentre_y, self.offset_x + self.decentre_x
 
     @property
     def offset(self) -> tuple[float, float]:
-        """Of the aperture (y, x) [m]."""
+        """Offset of the aperture (y, x) [m]."""
         return self.offset_y, self.offset_x
 
     @property
     def decentre(self) -> tuple[float, float]:
-        """Of the vertex from there (y, x) [m]."""
+        """Offset of the vertex from the middle of the aperture (y, x) [m]."""
         return self.decentre_y, self.decentre_x
 
     @field_validator("focal_change")
@@ -88,7 +88,7 @@ def _singles(value: Any) -> Any:
 
 
 Singles = Annotated[dict[int, OneLenslet], BeforeValidator(_singles)]
-"""What single lenslets have, by number."""
+"""Deviations of single lenslets, by number."""
 
 
 class Lenslets(Part):
@@ -106,16 +106,16 @@ class Lenslets(Part):
     layout
         "square" or "hex".
     magnification
-        Of a focused plenoptic camera, m = b/a of the first focal length: above 0 Keplerian, between -1
+        Magnification of a camera 2.0, m = b/a of the first focal length: above 0 Keplerian, between -1
         and 0 Galilean.
     shape
-        Of a lenslet: "square" or "hex", the lattice's cell, or "round"; left out, the cell.
+        Shape of a lenslet: "square" or "hex", the lattice's cell, or "round"; left out, the cell.
     fill_factor
         Width of a lenslet over the pitch; the rest is opaque.
     rotation
         From +x towards +y [rad], or text such as "2 mrad".
     offset
-        Of the lenslets from the axis (y, x), less than half a pitch.
+        Offset of the lenslets from the axis (y, x), less than half a pitch.
     index
         Refractive index of the lenslets, which tilts and surfaces need: at the camera's wavelength, or n_d
         beside an Abbe number.
@@ -123,7 +123,7 @@ class Lenslets(Part):
         Constant K of the curved side of plano-convex lenslets, 0 of spheres, whose rays model "exact" then
         follows; left out, lenslets are free of spherical aberration.
     thickness
-        Of the glass from vertex to flat side, where the curved side faces the main lens; left out, it faces
+        Thickness of the glass, vertex to flat side, if the curved one faces the main lens; left out, it faces
         the sensor. Of distances to the sensor, glass counts as thickness over index.
     abbe
         Abbe number V_d, by which the focal length changes with the wavelength; left out, it does not.
@@ -234,7 +234,7 @@ class Lenslets(Part):
         return found
 
     def surface(self, wavelength: float) -> Surface | None:
-        """The curved side at a wavelength [m]; None of ideal lenslets.
+        """Curved surface at a wavelength [m]; None for ideal lenslets.
 
         Raises
         ------
@@ -279,7 +279,7 @@ class Lenslets(Part):
         )
 
     def lattice(self) -> Lattice:
-        """Where the lenslets stand [m]."""
+        """Lattice of the lenslets [m]."""
         if self.layout == "hex":
             lattice = Lattice.hex(self.pitch, self.rotation, kinds=len(self.focal_length))
         else:
@@ -295,13 +295,13 @@ class Lenslets(Part):
         return pairs[self.holds(lattice.position(pairs))]
 
     def holds(self, centers: np.ndarray) -> np.ndarray:
-        """Whether the array has lenslets at centres (k, 2) of the lattice: (k,)."""
+        """True for centres (k, 2) of the lattice at which the array has lenslets (k,)."""
         across, along = self.turned(*centers.T)
         height, width = self.extent
         return (np.abs(across) <= height / 2) & (np.abs(along) <= width / 2)
 
     def __hash__(self) -> int:
-        """Of what all lenslets have: numbers by which some differ stand in a dict, which has no hash."""
+        """Hash of what all lenslets share: the values of single ones stand in a dict, which has no hash."""
         return hash((self.pitch, self.focal_length, self.count, self.layout, self.rotation, self.offset))
 
     def each(self) -> tuple[np.ndarray, np.ndarray]:
@@ -314,7 +314,7 @@ class Lenslets(Part):
         return centers, focal_lengths
 
     def own(self) -> tuple[Own, ...]:
-        """What single lenslets have of their own, in the frame that turns with the array."""
+        """Deviations of single lenslets, in the frame that turns with the array."""
         indices, found = self.indices(), []
         for number, one in self.single.items():
             i, j = indices[number - 1].tolist()
@@ -323,7 +323,7 @@ class Lenslets(Part):
         return tuple(found)
 
     def aside(self, scale: float) -> Aside | None:
-        """By how much micro-images stand beside the lattice, of vertices that do, times a scale [px/m].
+        """Offsets of micro-images from the lattice, of lenslets whose vertex is off it, times a scale [px/m].
 
         Where the raw image is turned the scale is negative, and indices are the other way round.
         """
@@ -334,7 +334,7 @@ class Lenslets(Part):
         return Aside(int(math.copysign(1, scale)) * indices, scale * np.array(list(ways.values())))
 
     def amid(self, count: Sequence[int]) -> dict[str, Any]:
-        """What `Instrument.replace` takes for the array's middle: so many lenslets, those of it that differ.
+        """Changes for `Instrument.replace` that keep the middle of the array, `count` lenslets.
 
         Of an array in which some differ it has one more along an axis where its middle would move.
         """
@@ -352,7 +352,7 @@ class Lenslets(Part):
 
     @property
     def spacing(self) -> float:
-        """How wide lenslets may be before two overlap, at most the pitch [m]."""
+        """Largest width of lenslets at which no two overlap, at most the pitch [m]."""
         if not self.single:
             return self.pitch
         along = np.stack(self.turned(*self.each()[0].T), -1)

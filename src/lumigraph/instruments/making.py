@@ -1,4 +1,4 @@
-"""How operators are made."""
+"""Options of making an operator."""
 
 from dataclasses import dataclass
 from os import PathLike
@@ -8,7 +8,7 @@ from lumigraph.core.progress import Progress
 
 @dataclass(frozen=True, slots=True)
 class Making:
-    """How an operator is made: how exactly, where it is kept, and who hears of its progress."""
+    """Options of making an operator: accuracy, folder to keep it in, and progress callback."""
 
     accuracy: float
     folder: str | PathLike[str] | None

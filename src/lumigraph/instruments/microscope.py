@@ -40,7 +40,7 @@ class LightFieldMicroscope(ScopeWithParts):
     Parameters
     ----------
     wavelength
-        Of the emission, its middle [m] or text with a unit.
+        Central wavelength of the emission [m], or text with a unit.
     objective
         `MicroscopeObjective`.
     lenslets
@@ -54,11 +54,11 @@ class LightFieldMicroscope(ScopeWithParts):
     bandwidth
         Full width of the emission band [m]; left out, one wavelength.
     relay_magnification
-        Of the lenses between the lenslets' images and the sensor.
+        Magnification of the lenses between the lenslets' images and the sensor.
     lenslet_offset
         Native image to lenslets [m], positive behind it ("2.0").
     sensor_distance
-        Lenslets to the plane that the sensor sees, b [m]; left out, their focal length.
+        Lenslets to the plane imaged on the sensor, b [m]; left out, their focal length.
     fourier_lens
         Focal length of the lens between native image and lenslets [m] ("fourier").
 
@@ -88,7 +88,7 @@ class LightFieldMicroscope(ScopeWithParts):
         folder: str | PathLike[str] | None = None,
         progress: Progress | None = None,
     ) -> Linear:
-        """The model of how this microscope sees slices at `depths`, for `lumigraph.deconvolve`.
+        """Operator of this microscope for slices at `depths`, for `lumigraph.deconvolve`.
 
         Parameters
         ----------
@@ -102,7 +102,7 @@ class LightFieldMicroscope(ScopeWithParts):
             Relative rms error of points' images. It sets how far light is followed, how finely it is sampled
             and how many samples behind a lenslet pixels are interpolated from. A Fourier microscope has none.
         pixels
-            What the raw image's pixels are: None, those of this description; a `Calibration`, those of a real
+            Pixels of the raw image: None, those of this description; a `Calibration`, those of a real
             camera, wherever its lenslets stand; a whole number N, N × N for each lenslet, as `rectify` gives.
         folder
             Keeps what is computed in files, mapped into memory when it is used.
@@ -140,14 +140,14 @@ class LightFieldMicroscope(ScopeWithParts):
         samples_per_lenslet: int | None = None,
         progress: Progress | None = None,
     ) -> Linear:
-        """The operator of a real camera's pixels, as exact as photographs are; its object is a volume."""
+        """Operator of a real camera's pixels, as accurate as photographs need; its object is a volume."""
         planes = depths or (0.0,)
         return self.operator(
             planes, samples_per_lenslet, accuracy=MODELLED, pixels=calibration, progress=progress
         )
 
     def would_be(self, share: float) -> str:
-        """A relay that explains a lattice so many times as large."""
+        """Relay magnification that would explain a lattice so many times as large."""
         relay = self.relay_magnification
         return f"a relay of {relay * share:.4g} instead of {relay:.4g}"
 
@@ -167,7 +167,7 @@ class LightFieldMicroscope(ScopeWithParts):
         return microscope_design.parameters(self)
 
     def point_image(self, y: float, x: float, dz: float = 0.0, *, accuracy: float = 1e-3) -> np.ndarray:
-        """Raw image (ny, nx) of a point anywhere [m] that is as bright as a sample of `object_grid` of 1.
+        """Raw image (ny, nx) of a point anywhere [m], as bright as a sample of 1 of `object_grid`.
 
         `accuracy` is the relative rms error; a Fourier microscope has none, and sees no points beside its
         `object_grid`.
@@ -181,7 +181,7 @@ class LightFieldMicroscope(ScopeWithParts):
         return self.imaged_point(y, x, dz, accuracy)[0]
 
     def imaged_point(self, y: float, x: float, dz: float, accuracy: float) -> tuple[np.ndarray, float]:
-        """As `point_image`, with the estimated relative rms error."""
+        """Image as of `point_image`, with the estimated relative rms error."""
         y, x, dz = (checks.finite(name, at) for name, at in zip(("y", "x", "dz"), (y, x, dz), strict=True))
         if self.configuration == "fourier":
             return self._fourier_point(y, x, dz), math.nan
@@ -215,7 +215,7 @@ class LightFieldMicroscope(ScopeWithParts):
         terms
             Noll indices; their coefficients, in waves rms, add to the description's aberrations.
         farthest
-            Of the points from the focused plane [m]: how many samples pixels are interpolated from.
+            Largest distance of points from the focused plane [m]; it sets the pixels' interpolation.
         accuracy, pixels
             As in `operator`.
         double
@@ -260,17 +260,17 @@ class LightFieldMicroscope(ScopeWithParts):
         return cell_sampling(shortest, self.lenslet, behind, samples, depths, accuracy)
 
     def _sampled(self, samples: int, N: int, apart: float, degree: int) -> CellSampling:
-        """By N samples along a lenslet, for pixels that stand so far apart [lenslets]."""
+        """Sampling by N samples along a lenslet, for pixels that stand so far apart [lenslets]."""
         fill = self.pixels.fill_factor
         width = narrowed(fill * apart, N) if degree == 1 else fill * apart
         return CellSampling(samples, N, width, degree, fill**2)
 
     def check_accuracy(self, accuracy: float) -> None:
-        """Refuse what `operator` cannot be as exact as, before any work."""
+        """Refuse an accuracy that `operator` cannot reach, before any work."""
         require_accuracy(accuracy)
 
     def magnifications(self) -> trade_offs.Range:
-        """Of the objective."""
+        """Magnifications of the objective."""
         own = self.objective.magnification
         return trade_offs.Range(
             "M, of the objective", own, (own / 4, own * 4),

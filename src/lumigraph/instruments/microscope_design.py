@@ -1,4 +1,4 @@
-"""What the designer shows of a light-field microscope: its sliders, and the image of a point."""
+"""Designer of a light-field microscope: its sliders, and the image of a point."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING

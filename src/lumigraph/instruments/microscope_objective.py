@@ -16,7 +16,7 @@ class MicroscopeObjective(Part):
     Parameters
     ----------
     magnification
-        As engraved.
+        Engraved magnification.
     numerical_aperture, immersion_index
         NA and n.
     maker
@@ -26,11 +26,11 @@ class MicroscopeObjective(Part):
     model
         "scalar", "vector", "paraxial" or "rays" (for images traced by rays); left out, vector from NA 0.8 on.
     axial_share
-        Of dipoles, with "vector"; 1/3 for all directions.
+        Axial share of dipoles, with "vector"; 1/3 for all directions.
     aberrations
         Zernike terms: Noll index to waves rms.
     sample_index, focus_depth
-        Of the medium around the object, and how deep in it the focused plane lies; left out, the immersion.
+        Index of the medium around the object, and depth of the focused plane in it; left out, the immersion.
     """
 
     magnification: Positive
@@ -55,12 +55,12 @@ class MicroscopeObjective(Part):
 
     @property
     def tube_focal_length(self) -> float | None:
-        """Of the tube lens, the maker's where none is given [m]; None where neither is."""
+        """Focal length of the tube lens, by default the maker's [m]; None if neither is given."""
         return self.tube_lens or (None if self.maker is None else closed_forms.tube_lens(self.maker))
 
     @property
     def actual_magnification(self) -> float:
-        """From the object to the native image: the engraved one, times the tube lens over the maker's."""
+        """Magnification to the native image: the engraved one, times the tube lens over the maker's."""
         if self.maker is None or self.tube_lens is None:
             return self.magnification
         return self.magnification * self.tube_lens / closed_forms.tube_lens(self.maker)

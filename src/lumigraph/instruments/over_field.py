@@ -57,9 +57,9 @@ class OverField(Part):
     wavelengths
         Ascending; left out, the terms are the same for every wavelength.
     unit
-        Of the terms: "waves", or "nm", "um" or "m" of path.
+        Unit of the terms: "waves", or "nm", "um" or "m" of path.
     terms
-        By Noll's index, a value for each field: of `y` row after row, and of `wavelengths` one set of fields
+        Terms by Noll's index, a value for each field: by `y` row by row, by `wavelengths` one set of fields
         after the other.
 
     Examples

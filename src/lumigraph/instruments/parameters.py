@@ -1,4 +1,4 @@
-"""What can be changed of an instrument: sliders with units and ranges, and instruments from their values."""
+"""Parameters of an instrument: sliders with units and ranges, and instruments from their values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,21 +23,21 @@ class Parameter:
     Parameters
     ----------
     key
-        As in the camera file, such as "lenslets.pitch".
+        Key in the camera file, such as "lenslets.pitch".
     label
-        For people.
+        Name for people.
     unit, scale
-        As it is written, and its size in SI.
+        Unit as it is written, and its size in SI.
     value
-        In that unit; text for a choice, None where it is computed.
+        Value in that unit; text for a choice, None where it is computed.
     low, high
         Ends of the slider, in that unit.
     kind
         "log" or "linear" slider, "whole" numbers, or a "choice".
     choices
-        Of a choice.
+        Words to choose from.
     optional
-        Whether it may be left out, and is then computed.
+        True if it may be left out, and is then computed.
     """
 
     key: str
@@ -73,7 +73,7 @@ def number(
 
 
 def magnified(key: str, label: str, value: float, ends: tuple[float, float]) -> Parameter:
-    """How many times larger something is shown."""
+    """Parameter of a magnification."""
     return Parameter(key, label, "×", 1.0, value, *ends)
 
 
@@ -88,17 +88,17 @@ def optional(parameter: Parameter, *, given: bool) -> Parameter:
 
 
 def wavelength(value: float) -> Parameter:
-    """From the near ultraviolet to the near infrared."""
+    """Parameter of the wavelength, near ultraviolet to near infrared."""
     return length("wavelength", "Wavelength", value, "nm", (350.0, 1000.0))
 
 
 def pixel(pixels: Pixels) -> Parameter:
-    """Their pitch."""
+    """Parameter of the pixel pitch."""
     return length("sensor.pixel_pitch", "Pixel pitch", pixels.pixel_pitch, "µm")
 
 
 def lenslets(part: Lenslets, *, layouts: bool) -> tuple[Parameter, ...]:
-    """Of an array, which may stand in either layout or only as it does."""
+    """Parameters of an array; its layout may be changed or is fixed."""
     found = [length("lenslets.pitch", "Lenslet pitch p", part.pitch, "µm")]
     if len(part.focal_length) == 1:
         found.append(length("lenslets.focal_length", "Lenslet focal length", part.focal_length[0], "mm"))
@@ -111,16 +111,16 @@ def lenslets(part: Lenslets, *, layouts: bool) -> tuple[Parameter, ...]:
 
 
 def changes(own: tuple[Parameter, ...], values: Any, count: tuple[int, int] | None) -> dict[str, Any]:
-    """What `Instrument.replace` takes for the values of a page: only those that differ from its own.
+    """Changes for `Instrument.replace` from a page's values: only those that differ from its own.
 
     Parameters
     ----------
     own
         Parameters at the instrument's values.
     values
-        By the parameters' keys, in their units; what is missing stays.
+        Values by the parameters' keys, in their units; what is missing stays.
     count
-        Of its lenslets; None without them.
+        Number of lenslets; None without them.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What all tables of a camera file have in common."""
+"""Base of all tables of a camera file."""
 
 from typing import Any
 

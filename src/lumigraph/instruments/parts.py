@@ -38,13 +38,13 @@ class MainLens(Part):
     focal_length
         [m] or text such as "60 mm".
     diameter
-        Of the stop; left out, it is matched to the lenslets.
+        Diameter of the stop; left out, it is matched to the lenslets.
     aberrations
         Zernike terms: Noll index to waves rms, of all fields.
     over_field
         Terms that change over the field besides: `OverField`, its table, or the path of a CSV file.
     prescription
-        In its place, the path of a ZMX file or of Optiland's JSON: its rays tell the terms.
+        Path of a ZMX file or of Optiland's JSON, in place of terms, which follow from its rays.
 
     Examples
     --------
@@ -76,7 +76,7 @@ class MainLens(Part):
 
     @property
     def varies(self) -> bool:
-        """Whether it changes over the field."""
+        """True if the lens changes over the field."""
         return self.over_field is not None or self.prescription is not None
 
 
@@ -94,13 +94,13 @@ class Pixels(Part):
     read_noise
         Electrons rms.
     bits
-        Of the readout.
+        Number of bits of the readout.
     quantum_efficiency, dark_current, exposure_time, black_level, prnu, dsnu, pattern_seed
         As for `Sensor`; left out, an ideal one. The time is text such as "10 ms", or [s].
     fill_factor
         Width of a pixel's active square over the pitch.
     angular_response
-        By the angle from the chief ray: `Angles`, behind lenslets of cameras only.
+        Response by the angle from the chief ray: `Angles`, behind lenslets of cameras only.
     """
 
     pixel_pitch: Length

@@ -41,11 +41,11 @@ class PlenopticCamera(LensletCamera):
     model
         "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration, or
         lenslets of glass, and Rayleigh and Sommerfeld's integral, for square lenslets of one focal length;
-        "auto": exact where the paraxial one misses the accuracy that is asked for.
+        "auto": exact where the paraxial one misses the requested accuracy.
     built
         `Built`: distances as built, where they are not the description's.
     tolerances
-        How far values may be off, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
+        Tolerances of values, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
 
     Raises
     ------
@@ -123,14 +123,14 @@ class PlenopticCamera(LensletCamera):
         """Images of points in a plane as functions of Zernike terms of the main lens, with derivatives.
 
         Points stand at (y, x, 0) in that plane, and shine as samples as large as a lenslet there. Lenslets go
-        on beyond the array, whose outermost two see some light that is not there.
+        on beyond the array, whose outermost two receive some light that does not exist.
 
         Parameters
         ----------
         terms
             Noll indices; their coefficients, in waves rms, add to the description's aberrations.
         dz
-            Of the plane from the focused one [m], positive farther.
+            Depth of the plane from the focused one [m], positive farther.
         accuracy
             Relative rms error of points' images, 1e-5 to 0.1.
         pixels

@@ -30,16 +30,16 @@ class FocusedPlenopticCamera(LensletCamera):
     sensor
         `Pixels`; without a shape all micro-images fit.
     matching
-        "views": D = z2 p / b, with which 1/m lenslets per axis see a point; "full": D = p L / b, with which
+        "views": D = z2 p / b, with which 1/m lenslets per axis image a point; "full": D = p L / b, with which
         micro-images are as wide as the lenslets.
     model
         "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration, or
         lenslets of glass, and Rayleigh and Sommerfeld's integral, for square lenslets of one focal length;
-        "auto": exact where the paraxial one misses the accuracy that is asked for.
+        "auto": exact where the paraxial one misses the requested accuracy.
     built
         `Built`: distances as built, where they are not the description's.
     tolerances
-        How far values may be off, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
+        Tolerances of values, as `lumigraph.tolerance` takes them, such as "±0.05 mm" of "separation".
 
     Raises
     ------
@@ -179,7 +179,7 @@ class FocusedPlenopticCamera(LensletCamera):
         )
 
     def magnifications(self) -> trade_offs.Range:
-        """Of the lenslets."""
+        """Magnifications of the lenslets."""
         m = self.lenslet_magnification
         ends = (min(0.05, m), max(1.5, m)) if m > 0 else (min(0.05, -m), max(0.95, -m))
         return trade_offs.Range(

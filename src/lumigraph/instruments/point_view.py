@@ -20,14 +20,14 @@ MOST_ALONG = 15
 """Lenslets along each side that are simulated."""
 
 MOST_SAMPLES = 9e6
-"""Of a plane: about two seconds."""
+"""Largest number of samples of a plane: about two seconds."""
 
 _MOST_PIXELS = 1200
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointImage:
-    """What the sensor sees of a point.
+    """Image of a point on the sensor.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class PointImage:
     lenslets
         Along y and x, that were simulated; None without lenslets.
     notes
-        Where the sampling is doubtful, and what was left out.
+        Remarks on doubtful sampling, and on what was left out.
     """
 
     data: np.ndarray
@@ -52,12 +52,12 @@ class Simulated(Camera, Protocol):
 
     @cached_property
     def sampling(self) -> Sampling:
-        """Of its planes."""
+        """Sampling of the planes."""
         ...
 
 
 def of_camera(small: Simulated, dz: float, count: tuple[int, int] | None = None) -> PointImage:
-    """Of a point on the axis, through the camera's own train of elements.
+    """Image of a point on the axis, through the camera's own train of elements.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def of_camera(small: Simulated, dz: float, count: tuple[int, int] | None = None)
     dz
         From the focused plane [m].
     count
-        Of those lenslets; None without them.
+        Number of those lenslets; None without them.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def of_camera(small: Simulated, dz: float, count: tuple[int, int] | None = None)
 
 
 def of_operator(operator: Linear, pixel_pitch: float) -> PointImage:
-    """Of the middle of an operator's one plane."""
+    """Image of the middle of an operator's only plane."""
     _, ny, nx = operator.shape[1]
     return PointImage(_middle(to_numpy(operator.psf((0, ny // 2, nx // 2)))), pixel_pitch)
 

@@ -1,4 +1,4 @@
-"""What pydantic found wrong, as one line of ours: the dotted field, the value, the remedy."""
+"""Pydantic's findings as one-line errors: the dotted field, the value, the remedy."""
 
 from difflib import get_close_matches
 from typing import Any, get_args, get_origin

@@ -195,7 +195,7 @@ def noll_index(key: Any) -> int:
 
 
 def numbers(value: Any) -> tuple[float, ...]:
-    """Of a list, finite.
+    """Numbers of a list, finite.
 
     Raises
     ------
@@ -210,12 +210,12 @@ def numbers(value: Any) -> tuple[float, ...]:
 
 
 def angles(value: Any, info: ValidationInfo) -> tuple[float, ...] | None:
-    """Of a list [rad]."""
+    """Angles of a list [rad]."""
     return _several(value, info, _angle, "['0 deg', '5 deg']")
 
 
 def wavelengths(value: Any, info: ValidationInfo) -> tuple[float, ...] | None:
-    """Of a list [m]."""
+    """Wavelengths of a list [m]."""
     return _several(value, info, _wavelength, "['486 nm', '656 nm']")
 
 
@@ -242,9 +242,9 @@ Length = Annotated[float, BeforeValidator(_length)]
 Displacement = Annotated[float, BeforeValidator(_displacement)]
 """A length of either sign [m]."""
 Wavelength = Annotated[float, BeforeValidator(_wavelength)]
-"""In vacuum [m]."""
+"""Wavelength in vacuum [m]."""
 Angle = Annotated[float, BeforeValidator(_angle)]
-"""At most half a turn either way [rad]."""
+"""Angle of at most half a turn either way [rad]."""
 Offset = Annotated[tuple[float, float], BeforeValidator(_pair)]
 """Two displacements (y, x) of either sign [m]."""
 Tilt = Annotated[tuple[float, float], BeforeValidator(_tilt)]
@@ -264,7 +264,7 @@ Fraction = Annotated[float, BeforeValidator(_fraction)]
 Bits = Annotated[int, BeforeValidator(_bits)]
 """1 to 16."""
 Seed = Annotated[int, BeforeValidator(_seed)]
-"""Of random numbers: 0 or more."""
+"""Seed of random numbers: 0 or more."""
 Counts = Annotated[tuple[int, int], BeforeValidator(_counts)]
 """Two whole numbers (ny, nx), at least 1."""
 Aberrations = Annotated[

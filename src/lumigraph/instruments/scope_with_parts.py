@@ -1,4 +1,4 @@
-"""Microscopes whose images have derivatives by whatever differs between two of them a little apart."""
+"""Microscopes whose images have derivatives by any difference between two nearby microscopes."""
 
 import math
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ class ScopeWithParts(SeesVolumes, DescribedMicroscope):
         accuracy: float = 1e-2,
         double: bool = False,
     ) -> tuple[PupilImages, list[tuple[PupilImages, PupilImages]]]:
-        """As `pupil_images` without terms, and those of pairs of microscopes a little apart, sampled alike.
+        """Pupil images without terms, and those of pairs of slightly changed microscopes, sampled alike.
 
         By pixels that may stand anywhere, so that they may move; those of the pairs in double precision.
 
@@ -48,7 +48,7 @@ class ScopeWithParts(SeesVolumes, DescribedMicroscope):
         pairs
             Microscopes a little to either side of this one.
         farthest
-            Of the points from the focused plane [m].
+            Largest distance of the points from the focused plane [m].
         points
             Along a lenslet, whose light is 1.
         accuracy, double
@@ -66,7 +66,7 @@ class ScopeWithParts(SeesVolumes, DescribedMicroscope):
         return replace(own, double=double), [(low, high) for low, high in ends]
 
     def fourier_points(self) -> FourierPoints:
-        """Images of points anywhere as a Fourier microscope sees them, with derivatives by their place.
+        """Images of points anywhere by a Fourier microscope, with derivatives by their position.
 
         Raises
         ------
@@ -102,7 +102,7 @@ class ScopeWithParts(SeesVolumes, DescribedMicroscope):
         *,
         accuracy: float = 1e-2,
     ) -> WholePlane:
-        """Raw images of a plane, with derivatives by whatever differs between pairs of microscopes.
+        """Raw images of a plane, with derivatives by any difference between pairs of nearby microscopes.
 
         The object stays where it is before all microscopes, along the lenslets' rows and columns, and as
         bright for each area: how it falls onto their lenslets is part of what is differentiated.

@@ -11,7 +11,7 @@ from lumigraph.operators.whole_planes import Part
 
 
 class SeesVolumes:
-    """One whose raw images of planes have derivatives."""
+    """Instrument whose raw images of planes have derivatives."""
 
     @abstractmethod
     def part_plane(
@@ -22,7 +22,7 @@ class SeesVolumes:
         *,
         accuracy: float = 1e-2,
     ) -> Part:
-        """Raw images of a plane, with derivatives by whatever differs between pairs of instruments."""
+        """Raw images of a plane, with derivatives by any difference between pairs of nearby instruments."""
 
     def part_volume(
         self,
@@ -32,7 +32,7 @@ class SeesVolumes:
         *,
         accuracy: float = 1e-2,
     ) -> PartVolume:
-        """Raw images of planes that shine at once, through each other: the sum of those of `part_plane`.
+        """Raw images of transparent planes that shine together: the sum of those of `part_plane`.
 
         Parameters
         ----------

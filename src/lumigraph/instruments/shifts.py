@@ -1,7 +1,7 @@
-r"""`find_shifts`: by how much an object was moved between raw images, from the raw images themselves.
+r"""`find_shifts`: shifts of an object between raw images, measured on the raw images themselves.
 
-What two raw images of an object differ by is a shift, or detail that lenslets do not resolve, which each raw
-image sees anew: so shifts are fitted to the likelihood of all raw images with the object integrated out
+Two raw images of an object differ by a shift, and by detail that lenslets do not resolve, which aliases
+differently in each. So shifts are fitted to the likelihood of all raw images with the object integrated out
 (`texture`), by steps of Gauss and Newton with Fisher's information. First much noise is assumed, which leaves
 the coarse detail that leads to the right place, and then less and less.
 
@@ -28,7 +28,7 @@ from lumigraph.instruments.microscope import LightFieldMicroscope
 from lumigraph.instruments.texture import Part, Told
 
 REACH = 0.5
-"""How far from where they start shifts are looked for [lenslets]: one standard deviation."""
+"""Standard deviation of shifts about their start, which limits the search [lenslets]."""
 
 TOLD = 0.1
 """Standard deviation [lenslets] above which a shift is warned of; where all are above it they are refused."""
@@ -37,20 +37,20 @@ BLUNT = (0.3, 0.06, 0.012, 0.0024)
 """Noise that is assumed at first, over the texture's variance."""
 
 MOST_STEPS, LONGEST, SETTLED = 40, 0.2, 0.3
-"""Of all; their length [lenslets]; and their size in standard deviations when they end."""
+"""Most steps; their largest length [lenslets]; and their size in standard deviations at the end."""
 
 GAIN = 0.1
-"""Of log-likelihood by the last step, when they end: spectra settle, too."""
+"""Gain of log-likelihood by the last step at which iterations end: spectra settle, too."""
 
 MOST_VALUES, LEAST_LENSLETS, MOST_PARTS = 640, 16, 12
-"""Of a part of the picture, and how many parts are looked at: those with the most texture."""
+"""Largest size of a part of the picture, and how many parts are used: those with the most texture."""
 
 ALIKE = 10
-"""How many parts' worth of shifts say in advance that parts agree."""
+"""Number of parts whose shifts a prior of agreement is worth."""
 
 MARGIN = 1.2
-"""By which errors are wider than Fisher's information says, set on ten draws of each of some kinds of object:
-what is no Gaussian texture is told less. On other draws errors were then 0.70 to 1.11 times as large as told
+"""Factor of errors over those of Fisher's information, set on ten draws of each of some kinds of object:
+other textures than Gaussian ones determine less. On other draws errors were 0.70 to 1.11 of those stated
 (`python -m benchmarks.found_shifts pulls`)."""
 
 BRIGHTER = 0.1
@@ -66,12 +66,12 @@ LINES = 0.9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundShifts:
-    """By how much an object was moved.
+    """Measured shifts of an object.
 
     Parameters
     ----------
     shifts
-        (k, 2) as (y, x) [m], for `joint_operator`. The first is as it was given: raw images tell differences.
+        (k, 2) as (y, x) [m], for `joint_operator`. The first is as given: raw images show differences only.
     errors
         (k, 2), their standard deviations [m], with the object unknown; 0 of the first.
     covariance
@@ -97,7 +97,7 @@ def find_shifts(
     exposure: Exposure | Sequence[Exposure] | None = None,
     progress: Progress | None = None,
 ) -> FoundShifts:
-    """By how much an object was moved between raw images of a camera or microscope 1.0.
+    """Shifts of an object between raw images of a camera or microscope 1.0.
 
     Works on the light of each lenslet, and takes the object for an unknown texture whose spectrum is fitted,
     for each part of the picture apart. Any camera 1.0, of which the raw images show the pixels, and a flat
@@ -108,12 +108,12 @@ def find_shifts(
     raws
         Two or more, of one object that was moved, or of a camera that was (minus the shifts).
     camera
-        That took them, of kind "plenoptic", or a microscope of configuration "1.0".
+        Camera that took them, of kind "plenoptic", or a microscope of configuration "1.0".
     start
-        Where the search begins (k, 2) as (y, x) [m], such as `scan`, within half a lenslet in the object
+        Start of the search (k, 2) as (y, x) [m], such as `scan`, within half a lenslet in the object
         (one standard deviation) of the truth; the first is kept. None for no shifts.
     exposure
-        Of all raw images, or of each, with the gain; None for what `Sensor.expose` has recorded.
+        Exposure of all raw images, or of each, with the gain; None for what `Sensor.expose` has recorded.
     progress
         Called as ``progress(fraction)``.
 
@@ -121,7 +121,7 @@ def find_shifts(
     ------
     CalibrationError
         One raw image, one of another shape, an unknown gain, no light, too few lenslets, or an object that
-        does not tell how it was moved, such as an even one.
+        does not show how it was moved, such as an even one.
     GeometryError
         A camera of another kind, or another number of shifts.
 
@@ -156,7 +156,7 @@ def find_shifts(
 
 
 def _gathering(camera: Instrument) -> Lensed:
-    """A camera each of whose lenslets gathers the light of one place, or the refusal of another."""
+    """Camera whose lenslets each gather the light of one place; others are refused."""
     if isinstance(camera, LightFieldMicroscope) and camera.configuration == "1.0":
         return camera
     if isinstance(camera, LensletCamera) and isinstance(camera, Decoded):
@@ -184,14 +184,14 @@ def _halves(places: np.ndarray, part: np.ndarray) -> list[np.ndarray]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fit:
-    """Shifts (k, 2) [lenslets], the spectrum of each part, and what is around them.
+    """Shifts (k, 2) [lenslets], the spectrum of each part, and the likelihood around them.
 
     Parameters
     ----------
     step
-        To the likeliest shifts (2 (k - 1),), all y first.
+        Step to the likeliest shifts (2 (k - 1),), all y first.
     covariance
-        Of the shifts, by what all parts and the start say.
+        Covariance of the shifts, from all parts and the start.
     """
 
     parts: Sequence[Part]
@@ -216,17 +216,17 @@ class _Fit:
 
     @property
     def deviations(self) -> np.ndarray:
-        """Of the shifts, in the order of the step."""
+        """Standard deviations of the shifts, in the order of the step."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def off(self) -> float:
-        """The step in standard deviations."""
+        """Size of the step in standard deviations."""
         return float(np.max(np.abs(self.step) / self.deviations))
 
     @property
     def likelihood(self) -> float:
-        """Its logarithm, with what the start says."""
+        """Log-likelihood, the prior of the start included."""
         return sum(one.likelihood for one in self.told) - _far(self.shifts - self.start)
 
     def moved(self) -> tuple[np.ndarray, list[np.ndarray]] | None:
@@ -267,7 +267,7 @@ def _far(off: np.ndarray) -> float:
 
 
 def _fitted(parts: Sequence[Part], start: np.ndarray, progress: Progress) -> _Fit:
-    """From where they start to where all raw images are likeliest."""
+    """Most likely shifts, from a start."""
     shifts, spectra = start.copy(), [part.usual() for part in parts]
     fit, before, gained = None, -np.inf, np.inf
     for number in range(MOST_STEPS):
@@ -282,7 +282,7 @@ def _fitted(parts: Sequence[Part], start: np.ndarray, progress: Progress) -> _Fi
     else:
         _warn(
             f"the last of {MOST_STEPS} steps gained {gained:.2g} of log-likelihood: shifts have not settled, "
-            "and errors are larger than told. Use an object with texture in all directions"
+            "and errors are larger than stated. Use an object with texture in all directions"
         )
     progress(1.0)
     assert fit is not None  # there are steps
@@ -300,20 +300,20 @@ def _judged(fit: _Fit, size: float) -> FoundShifts:
     worst, least = float(errors.max()), float(np.sqrt(np.linalg.eigvalsh(each).min()))
     if least > TOLD * size:
         raise CalibrationError(
-            f"the raw images do not tell how the object was moved: to ± {least:.2g} m in any "
+            f"the raw images do not show how the object was moved: only to ± {least:.2g} m in any "
             f"direction, where a lenslet is {size:.2g} m wide. Use an object with texture, or more light."
         )
     if worst > TOLD * size:
         k, axis = np.unravel_index(int(errors.argmax()), errors.shape)
         _warn(
-            f"the shift of raw image {k} along {'yx'[axis]} is told to ± {worst:.2g} m, where a lenslet is "
+            f"the shift of raw image {k} along {'yx'[axis]} is known to ± {worst:.2g} m, and a lenslet is "
             f"{size:.2g} m wide. Use an object with texture in all directions"
         )
     return FoundShifts(fit.shifts * size, errors, covariance, misfit)
 
 
 def _warn_of_light(whole: Part) -> None:
-    """Raw images of other light than is known of them."""
+    """Warn of raw images whose brightness differs from the known exposure."""
     means = whole.values.mean(1)
     k = int(np.argmax(np.abs(means - 1)))
     if abs(means[k] - 1) > BRIGHTER:
@@ -324,19 +324,19 @@ def _warn_of_light(whole: Part) -> None:
 
 
 def _warn_of_spots(whole: Part) -> None:
-    """Spots in the dark, which are no Gaussian texture."""
+    """Warn of spots in the dark, which are no Gaussian texture."""
     apart = whole.values - whole.values.mean()
     peaked = float(np.mean(apart**4) / np.mean(apart**2) ** 2) - 3
     if peaked > SPOTS:
         _warn(
             f"lenslets' light is that of some bright spots (excess kurtosis {peaked:.2g} > {SPOTS:g}): "
-            "shifts may be off by several times what is told. Use an object "
+            "errors of shifts may be several times the stated ones. Use an object "
             "with texture, or measure the shifts"
         )
 
 
 def _warn_of_lines(part: Part) -> None:
-    """Lines of one period, which lenslets may show as coarser ones."""
+    """Warn of lines of one period, which lenslets may show as coarser ones."""
     share = part.lines()
     if share > LINES:
         _warn(

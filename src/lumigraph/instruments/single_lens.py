@@ -71,13 +71,13 @@ class SingleLensCamera(WithParts):
 
     @property
     def pupil_diameter(self) -> float:
-        """Of the main lens' stop, D [m]."""
+        """Diameter D of the main lens' stop [m]."""
         assert self.main_lens.diameter is not None  # checked above
         return self.main_lens.diameter
 
     @cached_property
     def sampling(self) -> grids.Sampling:
-        """How finely the planes must be sampled, and are."""
+        """Required and actual sampling of the planes."""
         wavelength, z1, z2, diameter = (
             self.wavelength,
             self.object_distance,
@@ -139,7 +139,7 @@ class SingleLensCamera(WithParts):
 
 
 def _warned(operator: Linear, dz: float, accuracy: float) -> Linear:
-    """The same, with a word where it is less exact than asked for."""
+    """The operator, with a warning if it is less accurate than requested."""
     if operator.error > accuracy:
         warnings.warn(
             f"an accuracy of {accuracy:g} was asked for but images of the plane at {dz:g} m, far out of "

@@ -1,4 +1,4 @@
-"""The low-pass that keeps lenslet-shaped artefacts out of what is deconvolved."""
+"""Low-pass that keeps lenslet-shaped artefacts out of deconvolved objects."""
 
 from lumigraph.core.linear import Linear
 from lumigraph.deconvolution import LowPass

@@ -1,6 +1,6 @@
-r"""An unknown object as a random texture, of which only its spectrum is known, and what lenslets see of it.
+r"""An unknown object as a random texture, of which only the spectrum is known, and its image by lenslets.
 
-Values y that lenslets see at places p are Gaussian, with covariances
+Values y of lenslets at places p are Gaussian, with covariances
 
 .. math:: C_{ij} = \int S(f)\, |\hat h(f)|^2 e^{2\pi i f (p_i - p_j)} df, \quad
     S \propto (1 + |L^T f|^2)^{-\gamma}
@@ -17,17 +17,17 @@ import scipy.linalg as linalg
 from scipy.ndimage import map_coordinates, spline_filter
 
 SAMPLES = 12
-"""Of footprints and covariances, along a lenslet."""
+"""Samples of footprints and covariances along a lenslet."""
 
 PERIOD = 32
-"""Of covariances [lenslets]: longer than a part of the picture and what it depends on."""
+"""Period of covariances [lenslets]: longer than a part of the picture and what it depends on."""
 
 USUAL = np.array([0.0, np.log(2.0), 0.0, np.log(2.0), np.log(1.5)])
 """Spectra that are expected: logarithms of the strength over the values' variance, of lengths times 2π
 [lenslets], which are a triangle L, and of γ."""
 
 WIDE = np.array([3.0, 3.0, 5.0, 3.0, 0.5])
-"""How far spectra may be from it: one standard deviation."""
+"""Standard deviation of spectra about it."""
 
 ODD = 1e-3
 """Variance, over the texture's, of what no texture of one spectrum shows, such as edges."""
@@ -58,7 +58,7 @@ class Textures:
 
     @classmethod
     def of(cls, footprint: np.ndarray) -> "Textures":
-        """Of a footprint of `SAMPLES` along a lenslet."""
+        """Textures of a footprint of `SAMPLES` along a lenslet."""
         n = PERIOD * SAMPLES
         power = np.abs(np.fft.rfft2(footprint / footprint.sum(), (n, n))) ** 2
         power[0, 0] = 0.0  # of the mean nothing is assumed
@@ -90,14 +90,14 @@ def _spline(half: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Told:
-    """What a part of the picture says around some shifts and some spectrum.
+    """Log-likelihood of a part of the picture, with its derivatives by shifts and spectrum.
 
     Parameters
     ----------
     likelihood
-        Its logarithm, with what is expected of spectra.
+        Log-likelihood, the prior of spectra included.
     slope, information
-        By shifts, then by the spectrum.
+        Derivatives by shifts, then by the spectrum.
     moved
         Number of shifts.
     """
@@ -162,7 +162,7 @@ class Part:
 
     @property
     def variance(self) -> float:
-        """Of the texture, as lenslets see it; not below a tenth of the noise's."""
+        """Variance of the texture on the lenslets; not below a tenth of the noise's."""
         noise = float(self.noise.mean())
         return max(float(self.values.var()) - noise, 0.1 * noise)
 
@@ -171,12 +171,12 @@ class Part:
         return USUAL + np.array([np.log(self.variance), 0, 0, 0, 0])
 
     def likelihood(self, shifts: np.ndarray, spectrum: np.ndarray, blunt: float) -> float:
-        """Its logarithm, `blunt` times the variance added to the noise's."""
+        """Log-likelihood, `blunt` times the variance added to the noise's."""
         pairs = self._pairs(shifts)
         return self._likelihood(_Solved.of(self, pairs, self._splines(spectrum)[0], blunt), spectrum)
 
     def told(self, shifts: np.ndarray, spectrum: np.ndarray, blunt: float) -> Told:
-        """What it says around shifts (k, 2) [lenslets], the first of which is kept."""
+        """Log-likelihood and derivatives at shifts (k, 2) [lenslets], the first of which is fixed."""
         pairs, splines = self._pairs(shifts), self._splines(spectrum)
         solved = _Solved.of(self, pairs, splines[0], blunt)
         changes = [one for spline in splines[6:] for one in self._by_shifts(pairs.odd(spline))]
@@ -226,7 +226,7 @@ class _Pairs:
         return found + np.triu(found, 1).T
 
     def odd(self, spline: np.ndarray) -> np.ndarray:
-        """What changes its sign when a pair's places change theirs."""
+        """Part of a spline that changes its sign when a pair's places are exchanged."""
         found = self._upper(spline)
         return found - found.T
 

@@ -1,4 +1,4 @@
-"""`Tolerance`: by how much a part may be off, as the table ``[tolerances]`` of a camera file says."""
+"""`Tolerance`: allowed deviation of a part, table ``[tolerances]`` of a camera file."""
 
 import math
 import re
@@ -25,7 +25,7 @@ NAMES = {
     "lenslets.each.focal_length": "length", "lenslets.each.decentre": "length",
     "lenslets.each.tilt": "angle", "lenslets.each.form": "length", "lenslets.each.missing": "part",
 }  # fmt: skip
-"""What may be off, as keys of a camera file, and ``main_lens.aberrations.N`` [waves rms] of Noll index N.
+"""Keys of a camera file with tolerances, and ``main_lens.aberrations.N`` [waves rms] of Noll index N.
 
 Distances without a table are main lens to lenslets, lenslets to sensor and object to main lens; tilts and bow
 are those of ``[built]``. Below
@@ -47,7 +47,7 @@ _TEXT = re.compile(r"\s*(?:±|\+-|\+/-)\s*(.*?)\s*(normal|uniform)?\s*")
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """How far a value of a camera may be from what is described.
+    """Tolerance of a camera's value.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Tolerance:
     half
         Half of the range, in SI, or as a part of the value.
     relative
-        Whether it is a part of the value.
+        True if it is a part of the value.
     shape
         "normal": ± is two standard deviations, which 95 % of all cameras keep; "uniform": all keep it, and
         none is likelier than another. What lenslets have of their own is normal.
@@ -96,7 +96,7 @@ class Tolerance:
 
     @classmethod
     def parse(cls, name: str, text: str) -> "Tolerance":
-        """From text such as "±0.05 mm", "±1 %" or "±0.1 um uniform"; "+-" will do for the sign.
+        """Tolerance from text such as "±0.05 mm", "±1 %" or "±0.1 um uniform"; "+-" is accepted for "±".
 
         A part that is missing has no sign: "0.2 %".
 
@@ -135,7 +135,7 @@ class Tolerance:
 
     @property
     def is_of_each(self) -> bool:
-        """Whether each lenslet has its own."""
+        """True if each lenslet has its own deviation."""
         return self.name.startswith(EACH)
 
     def deviation_of(self, value: float) -> float:
@@ -188,7 +188,7 @@ def _number(name: str, text: str) -> float:
 
 
 def _part(text: Any) -> float:
-    """Of lenslets that are missing."""
+    """Fraction of lenslets that are missing."""
     if not isinstance(text, str) or not (found := _PART.fullmatch(text)):
         raise FormatError(f"the tolerance of {MISSING} is {str(text)[:60]!r} but must be like '0.2 %'.")
     return float(found[1]) / (100 if found[2] else 1)

@@ -1,4 +1,4 @@
-"""What an instrument trades for what, to first order, and how it changes with its magnification."""
+"""Trade-offs of an instrument, to first order, and how they change with its magnification."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Magnifications over which an instrument is looked at.
+    """Range of magnifications of an instrument.
 
     Parameters
     ----------
     label
-        What is magnified.
+        Name of the magnification.
     own
         The instrument's.
     ends
@@ -45,7 +45,7 @@ class Range:
 
 
 def single_lens(camera: "Camera") -> Iterator[Row]:
-    """Of a camera without lenslets."""
+    """Trade-offs of a camera without lenslets."""
     main = resolution.incoherent_cutoff(camera.wavelength, camera.f_number)
     cutoff = min(main, 1 / (2 * camera.pixels.pixel_pitch)) * camera.magnification
     yield from _resolved(cutoff, "min(1 / (λ F#), 1 / (2 pixel)) z2/z1")
@@ -53,7 +53,7 @@ def single_lens(camera: "Camera") -> Iterator[Row]:
 
 
 def plenoptic(camera: "PlenopticCamera") -> Iterator[Row]:
-    """Of a plenoptic camera 1.0."""
+    """Trade-offs of a plenoptic camera 1.0."""
     pitch, main = camera.lenslets.pitch, resolution.incoherent_cutoff(camera.wavelength, camera.f_number)
     pixels = camera.micro_image_pitch / camera.pixels.pixel_pitch
     apart = plenoptic1.resolvable_directions(camera.wavelength, _width(camera), camera.lenslet_distance)
@@ -68,7 +68,7 @@ def plenoptic(camera: "PlenopticCamera") -> Iterator[Row]:
 
 
 def focused(camera: "FocusedPlenopticCamera") -> Iterator[Row]:
-    """Of a focused plenoptic camera 2.0."""
+    """Trade-offs of a focused plenoptic camera 2.0."""
     wave, pitch, pixel = camera.wavelength, camera.lenslets.pitch, camera.pixels.pixel_pitch
     m, b = camera.lenslet_magnification, camera.lenslet_distance
     lenslets = plenoptic2.rendered_cutoff(wave, pitch, m, b)
@@ -87,7 +87,7 @@ def focused(camera: "FocusedPlenopticCamera") -> Iterator[Row]:
 
 
 def microscope(scope: "LightFieldMicroscope") -> Iterator[Row]:
-    """Of a light-field microscope whose lenslets stand at the native image."""
+    """Trade-offs of a light-field microscope whose lenslets stand at the native image."""
     part, wave = scope.objective, scope.wavelength
     aperture, n = part.numerical_aperture, part.immersion_index
     directions = scope_forms.directions(wave, aperture, scope.magnification, scope.lenslets.pitch)
@@ -106,7 +106,7 @@ def microscope(scope: "LightFieldMicroscope") -> Iterator[Row]:
 
 
 def fourier_microscope(scope: "LightFieldMicroscope") -> Iterator[Row]:
-    """Of a light-field microscope whose lenslets stand in the pupil."""
+    """Trade-offs of a light-field microscope whose lenslets stand in the pupil."""
     relay, pitch = scope.fourier_lens or math.nan, scope.lenslets.pitch
     finest = scope_forms.fourier_resolution(scope.wavelength, relay, scope.magnification, pitch)
     yield Row("directions per axis", scope.pupil_diameter / pitch, "", "2 f_F NA / (M d), across the pupil")
@@ -122,7 +122,7 @@ def _axial(scope: "LightFieldMicroscope") -> Row:
 
 
 def depth_of_field(camera: "Camera") -> Row:
-    """Of the whole aperture."""
+    """Row of the whole aperture's depth of field."""
     at_object = camera.object_distance / camera.pupil_diameter
     value = resolution.depth_of_field(camera.wavelength, at_object)
     return Row("depth of field", value, "m", "4 λ (z1/D)², whole aperture")

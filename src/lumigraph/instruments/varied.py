@@ -86,7 +86,7 @@ def changed(camera: Instrument, item: Mapping[str, Any]) -> Instrument:
 
 
 def value(camera: Instrument, name: str) -> Any:
-    """What the camera's file has under a key of `changed`; None where it has nothing, or several values."""
+    """Value under a key of `changed` in the camera's file; None if there is none, or several."""
     *path, last = ([one.strip() for one in part.split(",")] for part in name.split("."))
     places: list[Any] = [tomllib.loads(camera.to_toml())]
     for keys in (*path, last):
@@ -101,7 +101,7 @@ def _under(place: Any, key: str) -> Any:
 
 
 def _begun(camera: Instrument, keys: Sequence[str]) -> Any:
-    """What stands under keys that a file leaves out: the values of a list, or an empty table."""
+    """Default under keys that a file leaves out: the values of a list, or an empty table."""
     found: Any = camera
     for key in keys:
         found = getattr(found, key, None)
@@ -109,7 +109,7 @@ def _begun(camera: Instrument, keys: Sequence[str]) -> Any:
 
 
 def _inside(place: Any, key: str, name: str, begun: Any) -> Any:
-    """What stands under a key of a table or a list; in a table that has it not, what is begun."""
+    """Table or list under a key; in a table without it, the default `begun`."""
     key = _key(place, key, name)
     found = place.setdefault(key, begun) if isinstance(place, dict) else place[key]
     if not isinstance(found, dict | list):

@@ -1,4 +1,4 @@
-"""Cameras whose images have derivatives by whatever differs between two of them a little apart."""
+"""Cameras whose images have derivatives by any difference between two nearby cameras."""
 
 from collections.abc import Sequence
 from typing import Self
@@ -18,7 +18,7 @@ class WithParts(SeesVolumes, Camera):
     def part_images(
         self, pairs: Sequence[tuple[Self, Self]], *, accuracy: float = 1e-2
     ) -> PointImages | LeaningParts[PointImages]:
-        """Images of points, with derivatives by whatever differs between pairs of cameras a little apart.
+        """Images of points, with derivatives by any difference between pairs of nearby cameras.
 
         Parameters
         ----------
@@ -36,7 +36,7 @@ class WithParts(SeesVolumes, Camera):
             length; the exact model behind a lens that changes over the field; a pair of other models, numbers
             of pixels or lenslets, or of which other lenslets are missing.
         SamplingError
-            Array or sensor lean farther than nine distances can follow.
+            Array or sensor is tilted farther than nine distances can follow.
 
         Examples
         --------
@@ -62,7 +62,7 @@ class WithParts(SeesVolumes, Camera):
         *,
         accuracy: float = 1e-2,
     ) -> WholePlane | LeaningParts[WholePlane]:
-        """Raw images of a plane, with derivatives by whatever differs between pairs of cameras.
+        """Raw images of a plane, with derivatives by any difference between pairs of nearby cameras.
 
         The object stays where it is before all cameras, and as bright for each area: how it falls onto their
         lenslets is part of what is differentiated.

@@ -209,7 +209,7 @@ def _residual(found: dict[str, Any]) -> float:
 
 
 def _extras(found: dict[str, Any], lenslets: dict[str, Any]) -> dict[str, Any]:
-    """What files of the first versions do not have."""
+    """Values that files of the first versions lack."""
     extras: dict[str, Any] = {}
     if "missing" in lenslets:
         extras["missing"] = _numbers(lenslets, "lenslets.missing", (-1, 2)).astype(np.int64)

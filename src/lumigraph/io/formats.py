@@ -23,7 +23,7 @@ from lumigraph.io.source import MAX_PIXELS
 from lumigraph.io.target import check_target
 
 Noun = RawImage | LightField | Stack | Volume | DepthMap | Calibration | PointCloud
-"""What a file can hold."""
+"""Type of a file's content."""
 
 N = TypeVar("N", bound=Noun)
 
@@ -47,11 +47,11 @@ class Format:
     Parameters
     ----------
     name
-        Of the format.
+        Name of the format.
     endings
-        Of its files, in small letters.
+        Endings of its files, in small letters.
     module
-        Of `lumigraph.io`, which has ``load`` and, if it writes, ``save``; imported on first use.
+        Module of `lumigraph.io`, which has ``load`` and, if it writes, ``save``; imported on first use.
     writes
         Nouns that ``save`` takes; empty if the format is only read.
     reads
@@ -129,7 +129,7 @@ def format_of(path: str | os.PathLike[str]) -> Format:
     if place.is_dir() or not place.suffix:
         return FORMATS[-1]
     known = ", ".join(sorted({end for row in FORMATS for end in row.endings if end.startswith(".")}))
-    raise FormatError(f"{path} has no extension that lumigraph knows. Known extensions are {known}.")
+    raise FormatError(f"{path} has an unknown extension. Known extensions are {known}.")
 
 
 @overload
@@ -168,7 +168,7 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     shape: tuple[int, int] | None = None,
     max_pixels: int = MAX_PIXELS,
 ) -> Noun:
-    """What a file or a folder of views holds; its ending says which format (`docs/formats.md` has the table).
+    """Content of a file or a folder of views; its ending says which format (`docs/formats.md` has the table).
 
     Sizes are read from the headers and checked, against the file's own size too, before anything is
     decoded.
@@ -178,16 +178,16 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     path
         A file, a Zarr store, or a folder of views.
     noun
-        What it must hold, such as `RawImage`: anything else is refused, and type checkers know what returns.
+        Required type, such as `RawImage`: anything else is refused, and type checkers know what returns.
     what
-        Which part, where a file holds several (Lytro, HDF5): `contents` lists them.
+        Part of the file, where it holds several (Lytro, HDF5): `contents` lists them.
     page
-        Which page of a TIFF stack, or which frame of a series in Zarr; without it the pages of a TIFF file
+        Page of a TIFF stack, or frame of a series in Zarr; without it the pages of a TIFF file
         open as a `Stack`, or as a `Volume` where they were saved as one.
     views
         Views (v, u) of an ESLF mosaic; one number for both.
     shape
-        Rows and columns of the raw images, for calibration files that do not tell (`.xml`, `.ini`).
+        Rows and columns of the raw images, for calibration files without them (`.xml`, `.ini`).
     max_pixels
         Larger pictures are refused; four channels, or four values of a light field, count as one pixel.
 
@@ -280,7 +280,7 @@ def pages(path: str | os.PathLike[str]) -> int:
 
 
 def opens_pages(path: str | os.PathLike[str]) -> bool:
-    """Whether a file holds pages or frames that `open` reads one by one: a TIFF stack, a series in Zarr."""
+    """True if a file holds pages or frames that `open` reads one by one: a TIFF stack, a series in Zarr."""
     counted = _counted(source.existing(path))
     return counted is not None and (counted > 1 or format_of(path).module == "zarr")
 
@@ -309,7 +309,7 @@ def save(
         `RawImage`; an array (y, x) or (y, x, c); `DepthMap`, of which other formats than Zarr keep the values
         alone; `Stack`, or a list of arrays; `LightField`, `Volume`, `Calibration`, `PointCloud`.
     path
-        Its ending says which format; a light field goes into a folder of views where it has none.
+        File whose ending says which format; a light field goes into a folder of views where it has none.
     white
         Float that becomes white in a PNG or a film; the maximum if left out.
     fps

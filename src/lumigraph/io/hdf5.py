@@ -29,7 +29,7 @@ Noun = RawImage | LightField | Volume | Stack
 
 
 def load(path: Path, *, what: str | None = None, max_pixels: int = source.MAX_PIXELS) -> Noun:
-    """What lumigraph wrote, a Heidelberg light field, or one array.
+    """Content of an HDF5 file: an object that lumigraph saved, a Heidelberg light field, or one array.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _writing(path: Path) -> Iterator[h5py.File]:
 
 
 class _Spool(FileIO):
-    """A file whose failures libhdf5 does not see: it crashes where the disk is full."""
+    """File that hides its failures from libhdf5, which crashes on a full disk."""
 
     failure: OSError | None = None
 
@@ -144,7 +144,7 @@ def _reading(path: Path) -> Iterator[h5py.File]:
 
 
 def _header(path: Path, file: h5py.File) -> dict[str, Any] | None:
-    """What lumigraph wrote beside the pixels, None in files by others."""
+    """Header that lumigraph saved beside the pixels; None in files by others."""
     if not isinstance(file.get(_KEY, getlink=True), h5py.HardLink):
         return None
     text = file[_KEY]
@@ -245,7 +245,7 @@ def _restored(data: np.ndarray, found: dict[str, Any], valid: np.ndarray | None)
 
 
 def _guessed(data: np.ndarray, known: dict[str, float]) -> Noun:
-    """What an array by another program is, by its axes."""
+    """Object of an array by another program, guessed from its axes."""
     noun = _noun(data.ndim, data.shape)
     depth = data.dtype.itemsize * 8 if data.dtype.kind in "iu" else None
     if noun == "RawImage":

@@ -1,4 +1,4 @@
-"""What lumigraph writes beside the pixels of a raw image: one JSON object, the same in every format."""
+"""Header beside the pixels of a raw image: one JSON object, the same in every format."""
 
 import json
 import math

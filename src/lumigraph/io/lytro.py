@@ -69,7 +69,7 @@ class Container:
         return content
 
     def has(self, name: Any) -> bool:
-        """Whether a section of this name is in the file."""
+        """True if the file has a section of this name."""
         return isinstance(name, str) and name in self.sections
 
 

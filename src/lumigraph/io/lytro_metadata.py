@@ -1,4 +1,4 @@
-"""What a Lytro camera records about a raw frame (JSON): packing, colours, and the lenslets.
+"""Metadata of a Lytro camera's raw frame (JSON): packing, colours, and the lenslets.
 
 Both generations are read: F01, whose fields stand under image.rawDetails and image.color, and Illum.
 """
@@ -23,7 +23,7 @@ _FARTHEST = 10.0  # m: an exit pupil farther away than this is a placeholder for
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """How a raw frame is stored, and what is known about it.
+    """Storage and metadata of a raw frame.
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ class Frame:
     bayer
         Colours of the first 2 x 2 pixels, or None.
     pixel_pitch
-        In metres, or None.
+        Pixel pitch in metres, or None.
     known
-        For `RawImage.metadata`: black_level, white_level and white_balance as (r, gr, gb, b), colour_matrix
+        `RawImage.metadata`: black_level, white_level and white_balance as (r, gr, gb, b), colour_matrix
         (camera to linear sRGB), gamma, and all that was recorded under "lytro".
     """
 
@@ -79,7 +79,7 @@ def parse(content: bytes) -> dict[str, Any]:
 
 
 def frame(found: dict[str, Any]) -> Frame:
-    """How the raw frame that this metadata belongs to is stored.
+    """Storage and metadata of the raw frame that a JSON object describes.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def calibration(found: dict[str, Any]) -> Calibration:
 
 
 def field(found: Any, name: str) -> Any:
-    """What stands under a dotted name; None where nothing does."""
+    """Value under a dotted name; None if there is none."""
     for part in name.split("."):
         found = found.get(part) if isinstance(found, dict) else None
     return found

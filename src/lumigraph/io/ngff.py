@@ -29,7 +29,7 @@ def data(values: np.ndarray) -> np.ndarray:
 
 
 def names(volume: Volume) -> tuple[str, ...]:
-    """Of the axes of `data`."""
+    """Names of the axes of `data`."""
     return ("c", "z", "y", "x")[4 - len(volume.data.shape) :]
 
 
@@ -50,7 +50,7 @@ def describe(volume: Volume, *, times: bool = False) -> dict[str, Any]:
 
 
 def level(ome: Any) -> tuple[str, tuple[str, ...], dict[str, tuple[float, float]]]:
-    """Of the finest level: the array's name, its axes, and (scale, first position) [m] of z, y and x.
+    """Finest level: the array's name, its axes, and (scale, first position) [m] of z, y and x.
 
     Raises
     ------

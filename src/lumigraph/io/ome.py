@@ -26,7 +26,7 @@ _LONGEST = 16 << 20  # characters
 
 @dataclass(frozen=True, slots=True)
 class Planes:
-    """What an OME-XML text says of its first image.
+    """Planes of the first image of an OME-XML text.
 
     Parameters
     ----------
@@ -60,13 +60,13 @@ def text(
     Parameters
     ----------
     shape, dtype
-        Of the data.
+        Shape and type of the data.
     pitch
         Physical sizes (z, y, x) [m]; None is left out.
     depths
         Positions of the planes [m].
     name
-        Of the image.
+        Name of the image.
     note
         Kept in an annotation.
     """
@@ -96,7 +96,7 @@ def text(
 
 
 def parse(description: str) -> Planes | None:
-    """What an OME-XML text says; None for any other text.
+    """Planes that an OME-XML text describes; None for any other text.
 
     Raises
     ------

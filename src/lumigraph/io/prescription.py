@@ -23,13 +23,13 @@ _TYPES = ("STANDARD", "EVENASPH")
 _SHAPES = ("SQAP", "SQOB", "ELAP", "ELOB", "SPID", "UDAP", "UDOB", "CLOB", "OBDC")
 _VIGNETTING = ("VDXN", "VDYN", "VCXN", "VCYN", "VANN")
 _VISIBLE = (0.38e-6, 0.75e-6)
-"""Where a glass is known by its index and Abbe number [m]."""
+"""Range in which a glass is known by its index and Abbe number [m]."""
 
 _D_LINE = 587.5618e-9
 """Wavelength of the indices of a ZMX file [m]."""
 
 _SAME_INDEX = 1e-3
-"""By which a glass's index may be off the file's: melts and catalogues differ by less."""
+"""Difference allowed between a glass's index and the file's: melts and catalogues differ by less."""
 
 _MM, _UM = 1e-3, 1e-6
 
@@ -39,7 +39,7 @@ _DRAWN = 41
 
 @dataclass(frozen=True, slots=True)
 class FirstOrder:
-    """What a lens is to first order at a wavelength.
+    """First-order properties of a lens at a wavelength.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class Prescription:
     Parameters
     ----------
     path
-        Of a ZMX file or of Optiland's JSON.
+        Path of a ZMX file or of Optiland's JSON.
 
     Raises
     ------
@@ -162,7 +162,7 @@ class Prescription:
                 yield f"{name} is in no catalogue: it is followed by its index and Abbe number"
 
     def wavelengths(self) -> tuple[float, float]:
-        """From where to where the indices of all of its glasses are known [m]."""
+        """Range of wavelengths in which the indices of all glasses are known [m]."""
         low, high = 0.0, math.inf
         for surface in self._lens.surfaces.surfaces:
             material = surface.material_post
@@ -174,7 +174,7 @@ class Prescription:
         return low, high
 
     def first_order(self, wavelength: float) -> FirstOrder:
-        """What it is to first order at a wavelength [m].
+        """First-order properties at a wavelength [m].
 
         Raises
         ------
@@ -247,7 +247,7 @@ class Prescription:
         return Rays(*(each.reshape(len(heights), len(pupil)) for each in found))
 
     def drawn(self, wavelength: float, heights: np.ndarray, pupil: np.ndarray) -> dict[str, np.ndarray]:
-        """What a drawing shows: rays as those of `trace`, in the plane of the field, and surfaces [m].
+        """Arrays for a drawing: rays as those of `trace`, in the plane of the field, and surfaces [m].
 
         `rays` (rays, 2, n + 2), z and height at object, surfaces and image; `surfaces` (n, 2, points), z and
         height as far as the rays reach; `is_glass` (n,), behind each of them; `stop`, the number of one.
@@ -311,7 +311,7 @@ def _read(path: Path) -> Any:
 
 
 def content(path: Path) -> bytes:
-    """What a file of a reasonable size holds.
+    """Content of a file of a reasonable size.
 
     Raises
     ------
@@ -373,7 +373,7 @@ def _not_followed(name: str, what: str, remedy: str) -> GeometryError:
 
 
 def _is_number(word: str) -> bool:
-    """Whether it is one that is not 0."""
+    """True for a number that is not 0."""
     try:
         return float(word) != 0
     except ValueError:

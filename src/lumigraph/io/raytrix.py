@@ -35,7 +35,7 @@ def load(
     path
         The file, `RayCalibData`.
     shape
-        Rows and columns of the raw image: the file does not tell.
+        Rows and columns of the raw image, which the file does not contain.
     max_pixels
         Larger shapes are refused.
 
@@ -72,7 +72,7 @@ def save(
     Parameters
     ----------
     calibration
-        Of a hexagonal array.
+        Calibration of a hexagonal array.
     path
         The file (.xml).
     lens_types

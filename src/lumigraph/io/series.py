@@ -45,11 +45,11 @@ class Frame:
     Parameters
     ----------
     arrays
-        By name; of one shape and type in all frames.
+        Arrays by name; of one shape and type in all frames.
     axes
         Names of their axes.
     attributes
-        What else is known, as JSON values; those of the first frame are kept.
+        Other metadata, as JSON values; those of the first frame are kept.
     """
 
     arrays: dict[str, np.ndarray]
@@ -163,7 +163,7 @@ def write(path: Path, number: int, frame: Frame) -> Checksums:
 
 
 def is_whole(path: Path, files: Mapping[str, tuple[int, int]], *, content: bool = True) -> bool:
-    """Whether files of a store are there, of the size and, if their content is read, the checksum noted."""
+    """True if files of a store are there, with the noted size and, if `content`, the noted checksum."""
     for name, (size, checksum) in files.items():
         try:
             if (path / name).stat().st_size != size:
@@ -185,7 +185,7 @@ def count(path: Path) -> int | None:
 
 
 def load(path: Path, number: int, max_pixels: int = source.MAX_PIXELS) -> Any:
-    """What one frame was: a picture, several, views, a volume or a depth map.
+    """Content of one frame: a picture, several, views, a volume or a depth map.
 
     Raises
     ------
@@ -233,7 +233,7 @@ def _read(path: Path, group: zarr.Group, which: tuple[str, int], max_pixels: int
 
 
 def described(path: Path) -> dict[str, Any]:
-    """What a store says of itself: frames, layout, and what is known of all of them.
+    """Description of a store: frames, layout, and metadata of all of them.
 
     Raises
     ------
@@ -273,7 +273,7 @@ class _Writer(WrapperStore[LocalStore]):
         self.written: Checksums = {}
 
     async def get(self, key: str, prototype: Any, byte_range: Any = None) -> Buffer | None:
-        """What describes arrays; zarr would keep parts of a shard that is there, be it damaged."""
+        """Metadata of arrays; None for parts of a shard, which zarr would keep even if damaged."""
         return await super().get(key, prototype, byte_range) if key.endswith("zarr.json") else None
 
     async def set(self, key: str, value: Buffer) -> None:

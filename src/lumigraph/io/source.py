@@ -1,4 +1,4 @@
-"""What is checked before a file is decoded: that it exists, what it is, and how large it says it is."""
+"""Checks before a file is decoded: that it exists, its format, and the size that it declares."""
 
 import difflib
 import os
@@ -194,7 +194,7 @@ def check_held(path: Path, needed: float, stored: int, max_pixels: int) -> None:
     stored
         Bytes there are for them.
     max_pixels
-        What the caller allows.
+        Limit set by the caller.
 
     Raises
     ------
@@ -273,7 +273,7 @@ def check_inflated(path: Path, packed: bytes, limit: int, *, wbits: int = 47) ->
     path
         The file.
     packed
-        With the header of zlib or gzip, or without one where `wbits` is -15.
+        Compressed bytes with the header of zlib or gzip, or without one where `wbits` is -15.
     limit
         Bytes.
     wbits

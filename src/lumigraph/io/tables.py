@@ -15,7 +15,7 @@ from lumigraph.store import replacing
 ENDINGS = (".csv", ".parquet", ".nc")
 
 MOST_BYTES = 2**22
-"""Of a CSV file that is read: a table of a thousand rows of 40 numbers has some 400 KiB."""
+"""Largest size of a CSV file that is read: a table of a thousand rows of 40 numbers has some 400 KiB."""
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -27,7 +27,7 @@ class Axes:
     Parameters
     ----------
     values
-        Of each column, as the rows have them.
+        Values of each column, as the rows have them.
     places
         The same ones as numbers, where they are lengths [m].
     """

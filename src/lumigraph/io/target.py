@@ -1,4 +1,4 @@
-"""Where a result may be written; it is written atomically."""
+"""Output files: where they may be written, and writing them atomically."""
 
 import os
 import re
@@ -10,7 +10,7 @@ from lumigraph import store
 from lumigraph.errors import FormatError
 
 VIEWS = "views.json"
-"""What marks a folder of views that lumigraph wrote."""
+"""Marker of a folder of views that lumigraph wrote."""
 
 _VIEW = re.compile(r"view_\d+_\d+\.(png|tif)")
 
@@ -21,11 +21,11 @@ def check_target(path: str | os.PathLike[str], endings: Sequence[str] = (), *, f
     Parameters
     ----------
     path
-        Where a result is to be written.
+        Path of a result.
     endings
         Extensions that suit the result, such as ``(".tiff", ".png")``; empty for any.
     folder
-        Whether the result is a folder of views.
+        True if the result is a folder of views.
 
     Raises
     ------

@@ -35,11 +35,11 @@ def pixels(path: Path, image: tifffile.TiffPage, *, transparent: bool) -> np.nda
     Parameters
     ----------
     path
-        For messages.
+        Path for messages.
     image
-        Its size has been checked.
+        Image whose size has been checked.
     transparent
-        Whether extra samples such as transparency are kept.
+        True to keep extra samples such as transparency.
 
     Raises
     ------

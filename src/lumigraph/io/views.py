@@ -205,7 +205,7 @@ def _hci(path: Path, found: dict[re.Match[str], Path]) -> Files:
 
 
 def _stanford(path: Path, found: list[re.Match[str]]) -> tuple[Files, tuple[float, float]]:
-    """Rows and columns as counted in the names; the positions tell the spacing of the cameras."""
+    """Rows and columns as counted in the names; the positions give the spacing of the cameras."""
     files = {(int(m[1]), int(m[2])): path / m[0] for m in found}
     rows, columns = (max(place[k] for place in files) for k in (0, 1))
     table = np.array([[float(m[k]) for k in (1, 2, 3, 4)] for m in found])

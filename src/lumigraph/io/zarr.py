@@ -38,7 +38,7 @@ def count(path: Path) -> int | None:
 def load(
     path: Path, *, page: int | None = None, max_pixels: int = source.MAX_PIXELS
 ) -> RawImage | LightField | Volume | DepthMap:
-    """What is in a Zarr store by lumigraph, or the volume in any OME-Zarr.
+    """Content of a Zarr store by lumigraph, or the volume of any OME-Zarr.
 
     Of a series `page` chooses the frame, which may be a `Stack`, too.
 
@@ -216,7 +216,7 @@ def _reading(path: Path) -> Iterator[zarr.Group]:
 
 
 class _Writer(WrapperStore[LocalStore | ZipStore]):
-    """A store whose failures zarr does not see: it would leave its other chunks' tasks to complain later."""
+    """Store that hides its failures from zarr, whose other chunks' tasks would complain later."""
 
     failure: OSError | None = None
 

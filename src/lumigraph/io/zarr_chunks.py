@@ -1,4 +1,4 @@
-"""Whether the chunks of a Zarr store become what its metadata declares, before one is decoded."""
+"""Check that a Zarr store's chunks decode to the size its metadata declares, before one is decoded."""
 
 import struct
 import zipfile
@@ -153,7 +153,7 @@ def _declared(content: bytes) -> int | None:
 
 
 def _end_of_blocks(content: bytes, at: int) -> int:
-    """Where the blocks of a zstd frame that begin at a place end; those that are repeated bytes hold one."""
+    """End of the blocks of a zstd frame that begin at a place; blocks of one repeated byte hold one."""
     last = 0
     while not last and at + 3 <= len(content):
         head = int.from_bytes(content[at : at + 3], "little")

@@ -1,23 +1,12 @@
-"""Cameras with lengths: calibrated from boards of known size, and distances of what they see.
+"""Metric calibration of cameras from boards of known size, and positions of points that they see.
 
-- `Board`: the known object; `Corners`: where its corners show on raw images.
-- `find_corners`: the same from raw images of a chessboard (`chessboard`), or from their `views`.
-- `MetricCamera`: main lens, lenslets, sensor, as a geometry of rays (`geometry`).
-- `board`: the camera from corners, by bundle adjustment (`adjustment`) from a coarse search (`start`),
-  with the noise of corners that are seen many times (`noise`). `Measured` holds it, its errors, the poses.
-- `chart`: boards and other charts to print, in true size (`printed`).
-- `plan`: how to take pictures of the board, and how well they will tell the camera.
-- `load_camera`, `save_camera`: cameras in files of COMPOTE (`compote`) and LFToolbox (`lftoolbox`).
-- `triangulate`: positions of points from their micro-images.
-- `datasheet`: what a camera does, on `Charts` that `read_charts` finds in a folder or `simulate_charts` takes
-  by wave optics (`planes`: a picture of the charts; `Sheet`: the lines).
-- `twin`: what is out of place on a bench, from white images; a `Bench` simulates one, `corrected` gives the
-  camera file as it stands.
-- `simulated`: some of these of a camera as it is described, as sweeps measure them.
-
-T. Georgiev and A. Lumsdaine, "Focused plenoptic camera and rendering", J. Electron. Imaging 19 (2010),
-has the geometry; M. Labussiere et al., "Leveraging blur information for plenoptic camera calibration",
-IJCV 130 (2022), calibrate multi-focus cameras from such boards.
+- `Board`, `Corners`, `find_corners` (`chessboard`, `views`): the board, and its corners on raw images
+- `MetricCamera`, `board` (`geometry`, `start`, `adjustment`, `noise`): the camera by bundle adjustment
+- `plan`, `chart` (`printed`): poses for the pictures of a board; boards and other charts to print
+- `load_camera`, `save_camera`: files of COMPOTE (`compote`) and LFToolbox (`lftoolbox`)
+- `triangulate`: positions of points from their micro-images
+- `datasheet`, `read_charts`, `simulate_charts`, `simulated`: measured properties of a camera, on charts
+- `twin`, `Bench`, `corrected`: misalignment of a bench from white images, and the corrected camera file
 """
 
 from lumigraph.metric.calibration import Measured, Pose, board

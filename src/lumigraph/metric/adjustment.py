@@ -20,7 +20,7 @@ _ROUNDS = 3
 """Adjustments, each with the noise of the one before."""
 
 _STEPS, _STEADY = 40, 3e-3
-"""Of the noise in a round, at most, and the part of it by which the last one may change it."""
+"""Rounds of the noise, at most, and its relative change in the last one."""
 
 _WILD = 6.0
 """Standard deviations beyond which a place is another corner's."""
@@ -30,7 +30,7 @@ _SAME_TURN, _SAME_DISTANCE = 0.05, 0.02
 """Boards that turn by less [rad], and stand no farther apart, of their distance, count as the same."""
 
 _FLAT = 1e-3
-"""To which a board is taken to be flat at first, over its diagonal: paper on a plate."""
+"""Flatness that is assumed of a board at first, over its diagonal: paper on a plate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +112,7 @@ class Problem:
 
     @property
     def free(self) -> np.ndarray:
-        """See `freedom`."""
+        """Matrix from unknowns to the camera's numbers; see `freedom`."""
         return freedom(self.camera)
 
     @property
@@ -185,7 +185,7 @@ class Problem:
         return result
 
     def residual(self, unknowns: np.ndarray) -> np.ndarray:
-        """Of the corners, in standard deviations, and of what is known beforehand."""
+        """Residual of the corners, in standard deviations, and of prior knowledge of the camera."""
         numbers, heights, _ = self.split(unknowns)
         known = [(numbers[k] - value) / error for k, value, error in self.priors]
         even = heights / self.bow if self.bow else heights
@@ -266,14 +266,14 @@ def adjust(
 
 
 def _check_poses(poses: np.ndarray) -> None:
-    """Whether boards (frames, 6) stood differently: otherwise lengths follow from noise alone."""
+    """Refuse boards (frames, 6) that stood alike on all pictures: lengths would follow from noise alone."""
     turn = float(np.linalg.norm(np.ptp(poses[:, :3], axis=0)))
     away = float(np.ptp(poses[:, 3]) / abs(np.median(poses[:, 3])))
     if turn < _SAME_TURN and away < _SAME_DISTANCE:
         raise CalibrationError(
             f"the board stands the same on all {len(poses)} pictures, to {math.degrees(turn):.2g}° and "
-            f"{away:.2%} of its distance, which does not tell the camera. Take it at different distances and "
-            "angles, 10° and 10 % apart or more."
+            f"{away:.2%} of its distance, which does not determine the camera. Take it at different "
+            "distances and angles, 10° and 10 % apart or more."
         )
 
 
@@ -337,7 +337,7 @@ def placed(
 
 
 def _again(first: Problem, unknowns: np.ndarray) -> tuple[Problem, np.ndarray]:
-    """The problem with the noise of what is left over, without its wild corners."""
+    """The problem with the noise of its residuals, without its outliers."""
     kind, misfit, blur = first.corners.kind, first.misfit(unknowns), first.magnification(unknowns)
     typical = np.array([
         np.median(np.abs(misfit[kind == k])) if np.any(kind == k) else 1.0 for k in range(int(kind.max()) + 1)
@@ -354,7 +354,7 @@ def _again(first: Problem, unknowns: np.ndarray) -> tuple[Problem, np.ndarray]:
 
 
 def _noisy(problem: Problem, unknowns: np.ndarray, blur: np.ndarray | None) -> Problem:
-    """The problem with the noise that explains what is left over, and what the unknowns took out of it.
+    """The problem with the noise that explains its residuals and the part that the unknowns absorb.
 
     A camera and poses that are adjusted follow the noise, the more so the fewer the corners: what is left
     over is less than the noise, by the covariance of computed places (expectation-maximisation).
@@ -388,7 +388,7 @@ def _solved(jacobian: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def _covariance(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
-    """Of the camera's numbers and the poses."""
+    """Covariance of the camera's numbers and of the poses."""
     camera, poses = problem.free.shape[1], problem.free.shape[1] + problem.heights
     _, root = _solved(problem.jacobian(unknowns), problem.residual(unknowns))
     out = np.zeros((len(problem.camera.numbers) + len(unknowns) - poses, len(unknowns)))

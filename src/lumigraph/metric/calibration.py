@@ -24,7 +24,7 @@ LEAST_FRAMES = 3
 """Pictures of the board."""
 
 _TIED = 0.95
-"""Correlation of two numbers that are named as hard to tell apart."""
+"""Correlation above which two numbers are reported as hardly separable."""
 
 _BENT = 5e-4
 """Rms height of a board's corners over its diagonal from which on a note says so."""
@@ -32,7 +32,7 @@ _BENT = 5e-4
 _LENGTHS = ("f", "L", "b")
 
 _ROUNDS = 2
-"""In which light that lenslets spread and spill is taken out."""
+"""Rounds that correct for light that lenslets spread and spill."""
 
 WELL = 0.01
 """Half a 95 % interval over a length, beyond which a note names it."""
@@ -40,7 +40,7 @@ WELL = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """Where a board was.
+    """Position and rotation of a board on a picture.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class Measured:
 
     @property
     def correlation(self) -> np.ndarray:
-        """Of `camera.numbers`."""
+        """Correlation matrix of `camera.numbers`."""
         spread = np.where(self.errors > 0, self.errors, 1.0)
         return self.covariance / np.outer(spread, spread)
 
@@ -124,7 +124,7 @@ class Measured:
         return float(np.sqrt(np.mean(np.square(self.board.heights or 0.0))))
 
     def tied(self) -> Iterator[tuple[str, str, float]]:
-        """Pairs of numbers that the pictures hardly tell apart, with their correlation."""
+        """Pairs of numbers that the pictures hardly separate, with their correlation."""
         table = self.correlation
         for j, k in combinations(range(len(geometry.NAMES)), 2):
             if abs(table[j, k]) > _TIED:
@@ -160,7 +160,7 @@ class Measured:
         )
 
     def locate(self, corners: Corners) -> tuple[Pose, ...]:
-        """Where the board was on pictures that did not take part.
+        """Poses of the board on pictures that did not take part.
 
         Raises
         ------
@@ -202,7 +202,7 @@ def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
 
     The camera and the board's positions are adjusted together until the corners computed are those seen,
     weighted by the corners' own noise, which is estimated, and by what is known of the camera. Whatever the
-    pictures do not tell stays near what is known, and its interval says so.
+    pictures do not determine stays near its known value, with a wide interval.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def board(corners: Corners, board: Board, nominal: Nominal) -> Measured:
 
 
 def _cleared(found: Adjusted, corners: Corners, spill: Spill, board: Board, nominal: Nominal) -> Adjusted:
-    """By corners without what lenslets spread and spill; its own error is in the covariance.
+    """Adjustment by corners corrected for the light that lenslets spread and spill; its error is included.
 
     In micro-images, what is known of near and of far boards may be wrong by different parts.
     """
@@ -288,7 +288,7 @@ def _measured(found: Adjusted, corners: Corners, board: Board, nominal: Nominal,
 
 
 def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
-    """What to know before trusting a camera."""
+    """Remarks to read before trusting a camera."""
     yield from disagreement(result.camera, result.covariance, nominal, result.board)
     if unused:
         yield f"{unused} pictures show too few corners for a position and were not used"
@@ -296,14 +296,14 @@ def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
     given = nominal.focal_length * nominal.focal_length_error
     if error > 0.7 * given:
         yield (
-            f"the pictures hardly tell the focal length: {f * 1e3:.2f} mm rests on the {given * 1e3:.2g} mm "
-            "to which it was known, and distances with it. While the exit pupil is free, other poses of the "
-            "board hardly change that; a focal length that was measured does"
+            f"the pictures hardly determine the focal length: {f * 1e3:.2f} mm and all distances rest on the "
+            f"{given * 1e3:.2g} mm to which it was known. While the exit pupil is free, other poses of the "
+            "board hardly change that; a measured focal length does"
         )
     if unsure := ", ".join(_unsure(result)):
         yield (
             f"not known to {WELL:.0%}, in 95 of 100 cases: {unsure}. `lumigraph board plan` says which "
-            "pictures tell more, and what none tells"
+            "pictures determine more, and what none determines"
         )
     for one, other, how in result.tied():
         if one in _LENGTHS or other in _LENGTHS:
@@ -323,7 +323,7 @@ def _notes(result: Measured, nominal: Nominal, unused: int) -> Iterator[str]:
 
 
 def _spilt(corners: Corners, camera: MetricCamera) -> str:
-    """What was done about light that lenslets spread and spill."""
+    """Remark on the correction for light that lenslets spread and spill."""
     what = (
         "light that lenslets spill into their neighbours' micro-images moves corners in views"
         if corners.in_views
@@ -333,12 +333,12 @@ def _spilt(corners: Corners, camera: MetricCamera) -> str:
     if spill is None:
         return (
             f"{what} and makes b too long, by 2 to 6 % behind lenslets of 62 µm at f/14: this table of "
-            "corners does not tell by how much. Measure raw images, or a table that was written of them"
+            "corners does not say by how much. Measure raw images, or a table that was written from them"
         )
     wavelength, unsure = spill.wavelength, spill.unsure(camera)
     told = f"{what}, which is allowed for by diffraction at {wavelength * 1e9:.0f} nm, to {unsure:.0%}"
     if not corners.in_views and not spill.edges:
-        return f"{told}: a white image with dark between micro-images would tell the lenslets' focus"
+        return f"{told}: a white image with dark between micro-images would show the lenslets' focus"
     if corners.in_views or not (unmade := spill.unmade(camera)):
         return told
     (width, blur), (nearest, least) = unmade

@@ -91,7 +91,7 @@ class MetricCamera:
         )
 
     def project(self, points: np.ndarray, center: np.ndarray, kind: np.ndarray | int = 0) -> np.ndarray:
-        """Where lenslets show points.
+        """Places (n, 2), (y, x), at which lenslets show points [px].
 
         Parameters
         ----------
@@ -112,7 +112,7 @@ class MetricCamera:
         return geometry.project(self.numbers, points, center, kinds, self.pixel_pitch)
 
     def magnification(self, distance: float) -> float:
-        """Of the lenslets, m = b/a, for what is so far from the main lens [m]; negative if Galilean.
+        """Magnification of the lenslets, m = b/a, at a distance from the main lens [m]; negative if Galilean.
 
         Raises
         ------
@@ -126,7 +126,7 @@ class MetricCamera:
 
 @dataclass(frozen=True, slots=True)
 class Nominal:
-    """What data sheets say of a camera, and how sure that is (one standard deviation).
+    """Data sheet values of a camera, and their standard deviations.
 
     Parameters
     ----------
@@ -152,8 +152,8 @@ class Nominal:
         Of the kinds' gains.
     lenslet_distance, lenslet_distance_error
         Lenslets to sensor, b [m], and how well it is known, over itself: of a camera 1.0 the lenslets' focal
-        length. None if it is not known; then nothing tells a board whose squares are not as wide as they are
-        said to be.
+        length. None if it is not known; then a board whose squares are not as wide as they are said to be
+        cannot be recognised.
     pitch_ratio, pitch_ratio_error
         Of the micro-images' pitch on the sensor to the lenslets', 1 + b/E, and how well it is known. It gives
         the exit pupil, and so f, L and distances. None if the lenslets' pitch is not known.
@@ -192,7 +192,7 @@ class Nominal:
 
     @property
     def middle(self) -> Pair:
-        """Of the sensor (y, x) [px]."""
+        """Middle of the sensor (y, x) [px]."""
         return (self.shape[0] - 1) / 2, (self.shape[1] - 1) / 2
 
     def priors(self, kinds: int) -> list[tuple[int, float, float]]:

@@ -53,7 +53,7 @@ class Charts:
     name
         Of the camera.
     whites
-        White images of one light, one at least; two tell the noise, more tell it better.
+        White images of one light, one at least; two give the noise, more give it better.
     darks
         Without light, of the same exposure time.
     flats
@@ -215,7 +215,7 @@ def save_charts(charts: Charts, folder: str | os.PathLike[str]) -> list[Path]:
 
 
 def _names(light: str, images: Sequence[RawImage]) -> list[str]:
-    """Of the files of a light's exposures."""
+    """Names of the files of a light's exposures."""
     return [f"{light}-{k:0{len(str(len(images)))}}.tiff" for k in range(1, len(images) + 1)]
 
 

@@ -1,11 +1,9 @@
 r"""COMPOTE's `intrinsics.json`: a multi-focus camera, its lenslets and micro-images.
 
-Lengths are in millimetres, but for micro-images, which are in pixels from the centre of pixel (0, 0). The
-frame is the main lens': X to the right, Y down, Z towards the scene, so that array and sensor stand at
-negative Z and the sensor's own axes run against the picture's. Rotations are stored column by column.
-Distortion is a polynomial in the image point's distance from the axis, in millimetres, where `MetricCamera`
-has one in the field angle: they are equal for points at one distance, the file's ``dist_focus``. The format
-holds neither gains nor uncertainties.
+Lengths are in millimetres, but for micro-images, in pixels from the centre of pixel (0, 0). The frame is the
+main lens': X to the right, Y down, Z towards the scene. Rotations are stored column by column. Distortion is
+a polynomial in the image point's distance from the axis, equal to `MetricCamera`'s for points at the file's
+``dist_focus``. The format holds neither gains nor uncertainties. Conventions: docs/theory/metric.md.
 
 M. Labussiere et al., "Leveraging blur information for plenoptic camera calibration", IJCV 130 (2022), has the
 model; the conventions were checked on a published data set, whose 14,346 corners they explain to 0.7 px.
@@ -30,7 +28,7 @@ _WIDEST = 0.05  # px by which a lattice may be sheared at its end without a note
 
 
 def is_intrinsics(found: dict[str, Any]) -> bool:
-    """Whether a JSON object is such a file."""
+    """True if a JSON object is such a file."""
     return {"mia", "mla", "main_lens", "sensor"} <= found.keys()
 
 
@@ -155,7 +153,7 @@ def _left_out(camera: MetricCamera, calibration: Calibration, f_number: float | 
 
 
 def _irregular(camera: MetricCamera, shape: tuple[int, int]) -> Iterator[str]:
-    """Of a tilted array lenslets are regular in COMPOTE's files, and micro-images in a `MetricCamera`."""
+    """Remarks on irregularity by a tilted array: of lenslets in `MetricCamera`, of images in COMPOTE."""
     corner = math.hypot(*shape) / 2 * camera.pixel_pitch
     off = corner**2 * math.hypot(*camera.tilt) / camera.exit_pupil / camera.pixel_pitch
     if off > _SEEN:
@@ -163,7 +161,7 @@ def _irregular(camera: MetricCamera, shape: tuple[int, int]) -> Iterator[str]:
 
 
 def _shear(lattice: Lattice) -> float:
-    """How far rows slip along themselves for each pixel down, beyond what the layout has."""
+    """Shear of the rows: their slip for each pixel down, beyond the layout's own."""
     row, down = _axes(lattice)
     return float(row @ down / (np.hypot(*row) * np.hypot(*down)))
 
@@ -175,7 +173,7 @@ def _axes(lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _mesh(calibration: Calibration) -> tuple[dict[str, Any], np.ndarray]:
-    """Of the micro-images; and the place (x, y) [px] of its last node, which is the array's first."""
+    """Mesh of the micro-images; and the place (x, y) [px] of its last node, which is the array's first."""
     lattice = calibration.lattice
     row, down = _axes(lattice)
     (i0, j0), (i1, j1) = _box(calibration)

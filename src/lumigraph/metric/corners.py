@@ -26,7 +26,7 @@ _WRITTEN = (
 )
 
 PATTERNS = ("corners", "dots", "asymmetric dots", "charuco")
-"""What boards show.
+"""Patterns of boards.
 
 - corners: the inner ones of a chessboard
 - dots: dark ones on a white ground, on a square lattice
@@ -39,7 +39,7 @@ LEAST = 3
 """Corners along either side of a board."""
 
 FARTHEST = 1e6
-"""What no picture reaches to [px]."""
+"""Coordinate beyond all pictures [px]."""
 
 _COLUMNS = ("frame", "corner", "place", "center", "kind")
 
@@ -127,7 +127,7 @@ class Board:
 
     @classmethod
     def from_text(cls, text: str) -> "Board":
-        """Of text such as "9 x 5 corners, 10 mm": across, down, spacing, and what else `PATTERNS` have.
+        """Board from text such as "9 x 5 corners, 10 mm": across, down, spacing, and parts by pattern.
 
         Raises
         ------
@@ -150,14 +150,14 @@ class Board:
 
     @property
     def radius(self) -> float:
-        """Of the dots [m]; 0 of corners, which have none."""
+        """Radius of the dots [m]; 0 for corners, which have none."""
         if self.pattern not in ("dots", "asymmetric dots"):
             return 0.0
         return (self.spacing / 2 if self.size is None else self.size) / 2
 
     @property
     def text(self) -> str:
-        """As `from_text` takes it.
+        """Text of the board, as `from_text` takes it.
 
         >>> Board.from_text("9 x 6 charuco, 10 mm, markers 7 mm, DICT_4X4_50").text
         '9 x 6 charuco, 10 mm, markers 7 mm, DICT_4X4_50'
@@ -170,7 +170,7 @@ class Board:
 
     @property
     def what(self) -> str:
-        """In words, such as "chessboard of 9 x 5 inner corners"."""
+        """Description in words, such as "chessboard of 9 x 5 inner corners"."""
         down, across = self.shape
         inner = f"{across} x {down} inner corners"
         return {
@@ -188,19 +188,19 @@ class Board:
 
     @property
     def diagonal(self) -> float:
-        """From the first point to the last [m]."""
+        """Length from the first point to the last [m]."""
         return float(np.hypot(*np.ptp(self.points()[:, 1:], axis=0)))
 
     @property
     def middle(self) -> np.ndarray:
-        """Of the points (3,), (z, y, x) [m]."""
+        """Middle of the points (3,), (z, y, x) [m]."""
         points = self.points()
         return (points.min(0) + points.max(0)) / 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Corners:
-    """Where lenslets show the corners of a board: n places on raw images that stand upright.
+    """Corners of a board as lenslets show them: n places on upright raw images.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ class Corners:
         return Corners(*columns, in_views=self.in_views, spill=self.spill)
 
     def cleared(self, camera: "MetricCamera") -> "Corners":
-        """Where corners would be if this camera's lenslets spread and spilt no light."""
+        """Corners as they would be if this camera's lenslets spread and spilt no light."""
         if self.spill is None:
             return self
         way, width = self.place - self.center, self.spill.width(camera)

@@ -1,4 +1,4 @@
-"""`datasheet`: what a plenoptic camera does, measured on its white images and on charts."""
+"""`datasheet`: properties of a plenoptic camera, measured on its white images and on charts."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -119,7 +119,7 @@ def datasheet(charts: Charts, *, progress: Progress = silent) -> Sheet:
 
 
 def _lattice(white: RawImage, camera: LensletCamera | None) -> Calibration:
-    """Of the white image; the camera file decides where that shows two pitches that are as likely."""
+    """Lattice of the white image; the camera file decides between two equally likely pitches."""
     try:
         return calibrate(white)
     except CalibrationError:
@@ -140,7 +140,7 @@ def _missing(section: str, name: str, why: Exception | str) -> Entry:
 def _grid(
     white: RawImage, lattice: Calibration, whites: Sequence[RawImage]
 ) -> tuple[Calibration, list[Entry]]:
-    """The lattice through the lenslets well inside the array, its pitch, its rotation and what is off it."""
+    """The lattice through the lenslets well inside the array, its pitch, its rotation and its residual."""
 
     def placed(image: RawImage) -> Fitted:
         return places(np.asarray(to_numpy(image.data)), lattice)
@@ -219,7 +219,7 @@ def _light(charts: Charts) -> Iterator[Entry]:
 
 
 def _pairs(whites: Sequence[RawImage]) -> list[tuple[RawImage, RawImage]]:
-    """Of white images, one after the other: what the lamp changes between them is little."""
+    """Pairs of successive white images, between which the lamp changes little."""
     some = whites[: 2 * _PAIRS]
     return list(zip(some[::2], some[1::2], strict=False))
 

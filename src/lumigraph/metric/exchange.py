@@ -13,7 +13,7 @@ from lumigraph.metric.files import read_json, reading
 from lumigraph.store import write_bytes
 
 FORMATS = ("compote", "lftoolbox")
-"""What `save_camera` writes."""
+"""Formats that `save_camera` writes."""
 
 
 def load_camera(

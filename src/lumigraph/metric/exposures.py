@@ -1,4 +1,4 @@
-"""Several exposures of one light, read or drawn only when they are asked for, and their mean."""
+"""Exposures of one light, read or drawn only when they are used, and their mean."""
 
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
@@ -97,7 +97,7 @@ class Drawn(Exposures):
 
 
 def mean_image(images: Iterable[RawImage]) -> RawImage:
-    """Of several raw images of one light, one in memory at a time; a single one is given as it is.
+    """Mean of several raw images of one light, one in memory at a time; a single one as it is.
 
     Raises
     ------

@@ -23,7 +23,7 @@ from lumigraph.metric.spill import Spill
 from lumigraph.store import write_bytes
 
 COLUMNS = ("frame", "corner", "y", "x", "center_y", "center_x", "kind")
-"""Of a table of corners: lengths in pixels."""
+"""Columns of a table of corners, lengths in pixels."""
 
 IN_VIEWS = "in_views"
 """A column of ones in a table of corners that were found in views."""
@@ -110,7 +110,7 @@ def _alike(name: str, found: dict[str, np.ndarray]) -> float:
 
 
 def load_compote(folder: str | os.PathLike[str]) -> tuple[Corners, Board, Nominal]:
-    """What COMPOTE keeps in a folder: bap.csv, centers.csv, camera.json, scene.json.
+    """Corners, board and nominal camera from a COMPOTE folder: bap.csv, centers.csv, camera.json, scene.json.
 
     The blur of each corner is not read: COMPOTE computes it from its own first camera.
 
@@ -225,7 +225,7 @@ def load(path: str | os.PathLike[str]) -> Measured:
 
 
 def is_measured(path: str | os.PathLike[str]) -> bool:
-    """Whether a JSON file is a camera that `save` wrote."""
+    """True if a JSON file is a camera that `save` wrote."""
     return read_json(source.regular_file(path)).get("kind") == KIND
 
 
@@ -302,7 +302,7 @@ def _whole(name: str, found: dict[str, np.ndarray]) -> np.ndarray:
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Context in which whatever a file holds that a camera cannot have is its own fault, in one line."""
+    """Context in which values that no camera can have become errors of the file, in one line."""
     try:
         yield
     except LumigraphError as error:

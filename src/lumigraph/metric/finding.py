@@ -29,7 +29,7 @@ LEAST_SEEN = 3
 """Lenslets that must show a corner."""
 
 _DIM = 0.7
-"""How far a beam may reach beyond the main lens' stop where edges are looked for, over half its width."""
+"""Largest reach of a beam beyond the main lens' stop where edges are searched, over half its width."""
 
 _APART = 0.96  # pitches: width of micro-images up to which their edges tell stop and focus
 
@@ -47,7 +47,7 @@ def find_corners(
     wavelength: float | None = GREEN,
     progress: Progress = silent,
 ) -> Corners:
-    """Where lenslets or views show the corners or dots of a board, on raw images of a plenoptic camera.
+    """Corners or dots of a board on raw images of a plenoptic camera, as lenslets or views show them.
 
     Of a camera 2.0, a picture is rendered of each raw image, sharp all over (`lumigraph.depth.correlation`),
     and the board found on it by OpenCV. That says where each lenslet should show each corner; there it is
@@ -81,7 +81,7 @@ def find_corners(
     ------
     CalibrationError
         No pictures, one without the whole board, corners in no order that a flat board has, or squares too
-        small to be told apart.
+        small to be resolved.
     LumigraphError
         OpenCV, which finds boards but for chessboards in views, is not installed.
 
@@ -167,7 +167,7 @@ def _sights(
 
 
 def clear_radius(calibration: Calibration, ratio: np.ndarray, margin: float = rims.WINDOW) -> np.ndarray:
-    """How far from a micro-image's centre corners (n,) may be so that its rim does not pull at them [px].
+    """Radius (n,) about a micro-image's centre within which its rim does not displace corners [px].
 
     The beam of a lenslet is `ratio` times as wide on the micro-image. Where the stop cuts it, light falls off
     outwards within an edge's blur, so that the edge is found farther out.
@@ -177,7 +177,7 @@ def clear_radius(calibration: Calibration, ratio: np.ndarray, margin: float = ri
 
 
 def lit_radius(calibration: Calibration, margin: float = rims.WINDOW) -> float:
-    """How far from a micro-image's centre a corner may be, with `margin` of light around it [px]."""
+    """Radius about a micro-image's centre within which a corner has `margin` of light around it [px]."""
     return (calibration.fill or 1.0) * calibration.lattice.pitch / 2 - margin - 2
 
 
@@ -213,7 +213,7 @@ class _Lines:
     def of(
         cls, raw: RawImage, calibration: Calibration, board: Board, frame: int, sizes: np.ndarray
     ) -> "_Lines":
-        """From the board on the picture that lenslets' patches render."""
+        """Lines of a board's corners, found on the picture that lenslets' patches render."""
         patches = Patches.of(sizes, calibration)
         layout = Layout.of(calibration, patches, None)
         seen = chessboard.find(render(raw, calibration, sizes, blend=True), board, f"picture {frame}")

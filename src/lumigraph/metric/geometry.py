@@ -1,17 +1,11 @@
 r"""Rays from points through a main lens and the centres of lenslets to the sensor.
 
-The frame is upright, as raw images are: x to the right, y down, z away from the camera. A point at
-distance Z, in direction n = (y, x)/Z, has its image at V = fZ/(Z - f) behind the main lens, V n' from the
-axis with distortion. The ray through lenslet c, at L, meets the sensor b behind it at
+The frame is upright, as raw images are: x to the right, y down, z away from the camera. The ray to the image
+V n' of a point, through lenslet c at L, meets the sensor b behind it at
 
 .. math:: s = c + b (c - V n')/(L - V)
 
-and the lenslet whose micro-image stands at s0 is at c = s0 E/(E + b). In a view of a camera 1.0, s - s0 is
-given and s0 is where the point shows:
-
-.. math:: s_0 = \frac{(s - s_0) (L - V) + b V n'}{c / s_0 \, (L - V + b) - (L - V)}
-
-which holds for images in the lenslets' plane too. Every function here takes complex numbers too, for `slope`.
+Derivation, with views of cameras 1.0: docs/theory/metric.md. All functions take complex numbers, for `slope`.
 """
 
 from collections.abc import Callable
@@ -21,7 +15,7 @@ import numpy as np
 NAMES = (
     "f", "L", "b", "L/E", "axis y", "axis x", "tilt y", "tilt x", "k1", "k2", "k3", "p1", "p2",
 )  # fmt: skip
-"""Of a camera's numbers; the gains of its kinds of lenslets follow."""
+"""Names of a camera's numbers; the gains of its kinds of lenslets follow."""
 
 _TINY = 1e-24
 
@@ -54,7 +48,7 @@ def project(
 
 
 def magnification(numbers: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """Of the lenslets, b/a, for what is so far from the main lens (n,) [m]; negative if Galilean."""
+    """Magnification b/a of the lenslets (n,) at distances from the main lens (n,) [m]; Galilean below 0."""
     f, L, b = numbers[:3]
     return b / (L - f * distance / (distance - f))
 

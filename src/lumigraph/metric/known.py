@@ -1,12 +1,8 @@
-r"""What was known of a camera beforehand against what the pictures say: `disagreement`.
+r"""Comparison of prior knowledge of a camera with the result of its calibration: `disagreement`.
 
-A value x that was known as x_0 with variance σ_0² is adjusted with a variance σ²; if both are right, x - x_0
-has the variance σ_0² - σ². The sum of (x - x_0)²/σ_0² over all that was known is a chi-square of
-Σ (1 - σ²/σ_0²) degrees of freedom.
-
-Squares of a board that are wider than they are said to be, by a part, make b too short by that part, while
-the pictures and f stay as they are: objects far away in focal lengths are imaged f²/z behind the focus. So b
-alone tells how wide the squares are.
+A value known as x_0 with variance σ_0² is adjusted with a variance σ²; if both are right, x - x_0 has the
+variance σ_0² - σ². The sum of (x - x_0)²/σ_0² is a chi-square of Σ (1 - σ²/σ_0²) degrees of freedom.
+Only b shows the width of a board's squares: see docs/theory/metric.md.
 """
 
 import math
@@ -56,12 +52,12 @@ class _Known:
 
     @property
     def deviations(self) -> float:
-        """The same, in standard deviations of it; 0 where pictures tell nothing."""
+        """The same, in standard deviations of it; 0 where the pictures add nothing."""
         return self.pull / math.sqrt(self.told) if self.told > _TOLD else 0.0
 
     @property
     def doubtful(self) -> bool:
-        """Whether it is too far from what was known."""
+        """True if the value is too far from its known one."""
         return abs(self.deviations) > (_DOUBTFUL if self.name == "b" else _ONE_OF_MANY)
 
     @property
@@ -86,7 +82,7 @@ def disagreement(
     squares = next((one for one in every if one.name == "b"), None)
     if squares is None:
         yield (
-            "nothing that was given tells whether the board's spacing is right: if it is wrong by a "
+            "nothing that was given shows whether the board's spacing is right: if it is wrong by a "
             "part, b, distances and sizes are, too. Give how far the lenslets are from the sensor "
             "(--lenslet-distance)"
         )
@@ -114,7 +110,7 @@ def _all(camera: MetricCamera, covariance: np.ndarray, nominal: Nominal) -> Iter
 
 
 def _spacing(b: _Known, board: Board) -> str:
-    """How wide the pictures say that squares are, or a refusal."""
+    """Remark on the width of squares that the pictures imply, or a refusal."""
     implied = board.spacing * b.after / b.before
     part = math.hypot(b.error / b.before, b.left / b.after)
     told = (

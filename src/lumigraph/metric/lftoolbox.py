@@ -2,16 +2,8 @@ r"""LFToolbox' `CalInfo.json`: the 5 x 5 matrix that turns samples of a decoded 
 
 .. math:: (s, t, u, v, 1)^T = H \, (i, j, k, l, 1)^T
 
-with views i, j and lenslets k, l counted from 1, i and k to the right, j and l down; s, t where the ray meets
-the main lens [m], x to the right and y down, and u, v its direction, metres across for each metre away from
-the camera. With a lenslet at c, its micro-image's centre at c/κ, κ = E/(E + b), and a view δ from there,
-
-.. math:: (s, t) = \delta L/b - c (1 - L/E), \quad (u, v) = \delta/b \, (1 - L/f) + c \, (1/E + (1 - L/E)/f)
-
-so that H and the pitch of the micro-images tell f, L, b and E, given the pixel pitch. Distortion is k1, k2,
-k3, b1, b2: the ray's direction is b + (q - b)(1 + k1 r² + k2 r⁴ + k3 r⁶), q that of H and r = |q - b|.
-`MetricCamera` has the inverse, of a point's direction from the middle of the lens: equal to seventh order for
-far points, and b to first.
+with views i, j and lenslets k, l counted from 1, and distortion k1, k2, k3, b1, b2. H and the pitch of the
+micro-images give f, L, b and E, given the pixel pitch: docs/theory/metric.md.
 
 D. G. Dansereau, O. Pizarro and S. B. Williams, "Decoding, calibration and rectification for lenselet-based
 plenoptic cameras", CVPR 2013, has the model; the toolbox counts from 1 where the paper counts from 0.
@@ -34,7 +26,7 @@ _NEAR = 0.02  # of a view, by which a middle may be off without a note
 
 
 def is_info(found: dict[str, Any]) -> bool:
-    """Whether a JSON object is such a file, of version 0.4 or with a CameraModel as 0.5 has it."""
+    """True if a JSON object is such a file, of version 0.4 or with a CameraModel as 0.5 has it."""
     return "EstCamIntrinsicsH" in found or "EstCamIntrinsicsH" in (found.get("CameraModel") or {})
 
 
@@ -196,7 +188,7 @@ def _lengths(H: np.ndarray, pixel: float, views: float, step: float) -> tuple[fl
 
 
 def _part(matrix: np.ndarray, unit: np.ndarray) -> float:
-    """How many times `unit` a matrix is, at best."""
+    """Best factor by which a matrix is `unit`, by least squares."""
     return float(np.sum(matrix * unit) / np.sum(unit * unit))
 
 
@@ -215,7 +207,7 @@ def _place(lattice: Lattice, at: np.ndarray) -> tuple[float, float]:
 
 
 def _lattice(grid: dict[str, Any]) -> Lattice:
-    """Of the micro-images; rows lead across, the toolbox' horz."""
+    """Lattice of the micro-images; rows lead across, the toolbox' horz."""
     if grid.get("Orientation", "horz") != "horz":
         raise FormatError(f"LensletGridModel.Orientation is {grid['Orientation']!r} but must be 'horz'.")
     across, down, turn, x, y = (
@@ -284,7 +276,7 @@ def _distortion(model: dict[str, Any]) -> Any:
 
 
 def _inverted(k1: float, k2: float, k3: float) -> tuple[float, float, float]:
-    """Of r (1 + k1 r² + k2 r⁴ + k3 r⁶) the inverse, as such a series."""
+    """Inverse of r (1 + k1 r² + k2 r⁴ + k3 r⁶), as such a series."""
     return -float(k1), float(3 * k1**2 - k2), float(8 * k1 * k2 - 12 * k1**3 - k3)
 
 

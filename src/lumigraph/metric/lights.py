@@ -23,13 +23,13 @@ FILL = 0.8
 """Part of a full well that white images and charts fill."""
 
 ACCURACY = 1e-2
-"""Of simulated charts, as good as their noise: at 1e-3 an image out of focus may take minutes."""
+"""Accuracy of simulated charts, as good as their noise: at 1e-3 an image out of focus may take minutes."""
 
 EXPOSURES = 16
-"""Of each light, of small sensors. What noise of depth needs more for, the sheet says."""
+"""Exposures of each light, for small sensors. The sheet says where the noise of depth needs more."""
 
 _PIXELS = 40e6
-"""Of all exposures of a light together: the sheet of five planes then takes some minutes."""
+"""Pixels of all exposures of a light together: the sheet of five planes then takes some minutes."""
 
 _FLATS = (0.1, 0.25, 0.45, 0.65)  # the same of further white images, for photon transfer
 _CELL = 22.0  # samples of the picture to a square, of the farthest chart
@@ -56,7 +56,7 @@ def usual_depths(camera: LensletCamera) -> tuple[float, ...]:
 
 
 def usual_exposures(camera: LensletCamera) -> int:
-    """Of each light: fewer of a large sensor, whose many places make up for it."""
+    """Exposures of each light: fewer for a large sensor, whose many places make up for it."""
     rows, columns = camera.sensor.shape
     return int(np.clip(_PIXELS / (rows * columns), 2, EXPOSURES))
 
@@ -105,7 +105,7 @@ def simulate_charts(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lights:
-    """What a camera's sensor would see of white images and charts, before its noise.
+    """Light on a camera's sensor of white images and charts, before noise.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Lights:
         accuracy: float = ACCURACY,
         progress: Progress = silent,
     ) -> "Lights":
-        """By wave optics; parameters and errors as of `simulate_charts`.
+        """Light by wave optics; parameters and errors as in `simulate_charts`.
 
         Without `textured`, random patterns for depth are left out.
         """
@@ -162,7 +162,7 @@ class Lights:
     def exposed(
         self, rng: np.random.Generator, name: str = "camera", *, exposures: int = EXPOSURES
     ) -> Charts:
-        """Raw images with the sensor's noise, drawn when they are asked for."""
+        """Raw images with the sensor's noise, drawn when they are used."""
         sensor, top = self.camera.sensor, float(np.quantile(self.white, 0.999))
 
         def several(light: np.ndarray, fill: float = FILL, count: int = max(2, exposures)) -> Drawn:
@@ -185,7 +185,7 @@ class Lights:
 
 
 def _sample(camera: LensletCamera, depth: float) -> float:
-    """Between samples of a picture, on a chart at a depth [m]."""
+    """Distance between samples of a picture, on a chart at a depth [m]."""
     per = max(1, abs(round(camera.patch_at(depth)))) if isinstance(camera, Rendered) else 1
     return camera.lenslets.pitch * camera.defocused(depth) / camera.separation / per
 

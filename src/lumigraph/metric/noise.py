@@ -1,13 +1,10 @@
-r"""Noise of corners that many lenslets show: each place has its own, and all places of a corner share some.
+r"""Noise of corners that many lenslets show: an independent part, and one shared by all places of a corner.
 
-What they share (blur, print, a board that is not flat) does not average out over lenslets. With variance σ²
-of one place and τ² of what n places share, residuals r become independent, of variance 1, as
+With variance σ² of one place and τ² of what n places share, residuals r become independent, of variance 1, as
 
 .. math:: (r - \bar r \, (1 - \sigma / \sqrt{\sigma^2 + n \tau^2})) / \sigma
 
-Blur makes places less exact, and grows with the distance from what lenslets see in focus: σ² of each kind
-changes with the lenslets' magnification m = b/a as a power of it, (m/m_0)^k. (By k = -0.75, -0.2 and -0.4 the
-three kinds of a Raytrix R12 do, within 15 % from m = 0.06 to 0.35.)
+σ² of each kind of lenslet changes with the magnification m = b/a as (m/m_0)^k: docs/theory/metric.md.
 """
 
 from dataclasses import dataclass
@@ -57,7 +54,7 @@ class Noise:
         return own * (np.clip(np.abs(magnification), low, high) / middle) ** (self.trend[kind] / 2)
 
     def is_like(self, other: "Noise", part: float) -> bool:
-        """Whether variances differ by no more than a part of a place's own."""
+        """True if variances differ by no more than a part of a place's own."""
         mine, others = (np.append(one.own, (one.shared, one.sway)) ** 2 for one in (self, other))
         scale = np.append(self.own, (self.own.min(), self.sway)) ** 2
         return bool((np.abs(mine - others) <= part * scale).all())

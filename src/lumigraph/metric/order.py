@@ -1,4 +1,4 @@
-"""Which of the places found is which point of a board: checked, mended where that can be, or refused."""
+"""Order of a board's points among the places found: checked, mended where that is possible, or refused."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, KDTree, QhullError
 from lumigraph.errors import CalibrationError
 
 _OFF = 0.3
-"""Of the way to the nearest place: how far a place may be from where the others of a flat board lead to."""
+"""Largest error of a place on a flat board, by the others, over the distance to the nearest one."""
 
 _FLAT = 0.02
 """Width over length of a board seen from the side that no detector finds any more."""
@@ -25,7 +25,7 @@ def ordered(places: np.ndarray, points: np.ndarray) -> np.ndarray:
     Raises
     ------
     CalibrationError
-        Places that no order makes a flat board.
+        If no order of the places makes a flat board.
     """
     off = misplaced(places, points)
     if off <= _OFF:
@@ -41,7 +41,7 @@ def ordered(places: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def told_of(what: str) -> Iterator[None]:
-    """Errors about what is found name the picture."""
+    """Context in which errors name the picture."""
     try:
         yield
     except CalibrationError as error:
@@ -49,7 +49,7 @@ def told_of(what: str) -> Iterator[None]:
 
 
 def misplaced(places: np.ndarray, points: np.ndarray) -> float:
-    """How far a place is at most from the homography of them all, over the way to the nearest other place.
+    """Largest distance of a place from the homography of them all, over that to the nearest other place.
 
     Infinite where the board would be seen from behind, and where places coincide or lie on a line.
     """

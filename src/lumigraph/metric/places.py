@@ -1,22 +1,11 @@
-r"""Where lenslets stand on a white image, without the bias of pixels, and how well that gives the lattice.
+r"""Places of lenslets on a white image, without the bias of pixels, and the uncertainty of the lattice.
 
-Micro-images that nearly touch show thin dark gaps, of which a window that ends on whole pixels sees more or
-less: centres found one by one are off by some 0.01 px, in a pattern that repeats with the pixels, and those
-at the array's border by more, since a neighbour's light is missing. Both lean on the pitch. The phase of the
-lattice's harmonics under a normal window of `WIDTH` pitches has neither, where it ends inside the array,
+The places are the phases of the lattice's harmonics under a normal window of `WIDTH` pitches, which have
+neither the pixels' bias nor that of the array's border:
 
 .. math:: \phi_k = \arg \sum_x w(x - x_k)\, \big(I(x) - \bar I\big)\, e^{2 \pi i\, u(x)}
 
-with u the place in the lattice. What noise adds to it is shared by windows that overlap: on a square lattice
-
-.. math:: \sum_d e^{-d^2 / 4 \sigma^2} = 4 \pi \sigma^2
-
-lenslets err as one, `TOGETHER`, and errors of sums grow by the root of that. Pitch and rotation have the
-errors of least squares through lenslets with neighbours on all sides, which err alike by the sum's terms.
-
-Pixels that are too coarse for the light alias it into the phase: none where the lenslets' f-number is above
-the pixels' width over the wavelength. Beyond, with pitches of nearly a whole number of pixels, the errors do
-not hold what aliasing does to the pitch (sharp discs of 12.02 px: 8e-4 px).
+with u the place in the lattice. Errors shared by overlapping windows, and aliasing: docs/theory/metric.md.
 """
 
 import math
@@ -77,20 +66,20 @@ def _traced(data: np.ndarray, model: Calibration, calibration: Calibration) -> F
     if kept.sum() < _LEAST:
         raise CalibrationError(
             f"{int(kept.sum())} lenslets are {_MARGIN:g} pitches or more inside the array, but {_LEAST} are "
-            "needed to tell how exact its pitch is. Use a picture of more lenslets."
+            "needed to estimate the error of its pitch. Use a picture of more lenslets."
         )
     spots = Spots(found.indices[kept], found.centers[kept], found.light[kept, 0])
     return fit(spots, model)
 
 
 def _rest(fitted: Fitted) -> np.ndarray:
-    """From the lattice and its warp to where lenslets stand (n, 2) [px]."""
+    """Residuals (n, 2) of lenslets from the lattice and its warp [px]."""
     points = fitted.lattice.position(fitted.spots.indices)
     return fitted.spots.centers - (points if fitted.warp is None else fitted.warp.applied(points))
 
 
 def _covariance(fitted: Fitted) -> np.ndarray:
-    """Of the vectors (y, x) to the next row and to the next lenslet (4, 4) [px²], with the warp's in it."""
+    """Covariance (4, 4) of the vectors (y, x) to the next row and to the next lenslet [px²]."""
     inner = surrounded(fitted.spots.indices)  # which alone `fit` lays the lattice through
     index, rest = fitted.spots.indices[inner], _rest(fitted)[inner]
     points = fitted.lattice.position(index)

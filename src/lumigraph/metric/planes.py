@@ -1,4 +1,4 @@
-"""What a picture of the chart tells: sharpness, size, distortion and depth of its plane."""
+"""Measures of one picture of a chart: sharpness, size, distortion and depth of its plane."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -160,7 +160,7 @@ def plane(
     *,
     rendered: bool,
 ) -> Plane:
-    """What the pictures of the charts at one distance tell.
+    """Measures of the pictures of the charts at one distance.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def plane(
 def scene(
     ready: PreparedImage, number: int, camera: LensletCamera | None, *, rendered: bool
 ) -> tuple[list[Entry], np.ndarray | None]:
-    """How sure depth is of a scene that nobody knows, and its picture (y, x) in focus at the median depth.
+    """Uncertainty of depth in an unknown scene, and its picture (y, x) in focus at the median depth.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def _expected(found: DepthMap, name: str, of_values: str, unit: str) -> Iterator
     """The median of the errors that a map expects, and the range of its values."""
     trust = np.asarray(to_numpy(found.confidence)) >= TRUSTED
     if found.error is None:
-        yield _not(name, "the method does not tell its error")
+        yield _not(name, "the method does not estimate its error")
     else:
         error = float(np.nanmedian(np.asarray(to_numpy(found.error))[trust]))
         how = f"median of the errors that the depth map expects, {trust.mean():.0%} of the places trusted"
@@ -254,7 +254,7 @@ def of_chart(tried: Tried, spacing: float | None) -> list[Quantity]:
 
 
 def is_middle(at: np.ndarray, chart: Chart) -> bool:
-    """Whether a place (y, x) is in the middle of the picture."""
+    """True if a place (y, x) is in the middle of the picture."""
     middle = (np.array(chart.picture.shape) - 1) / 2
     return bool(np.hypot(*(at - middle)) < _MIDDLE * np.hypot(*middle))
 
@@ -313,7 +313,7 @@ def _shape(tried: Tried, spacing: float | None) -> list[Entry]:
 
 
 def _half(error: float, freedom: int, sway: float) -> float:
-    """Half a 95 % interval, of a standard deviation by few corners (Student's t) and what else sways."""
+    """Half width of a 95 % interval, by the deviation of few corners (Student's t) and other variation."""
     return math.hypot(float(student.ppf(0.975, max(freedom, 1))) * error, 1.96 * sway)
 
 
@@ -356,7 +356,7 @@ def _less(entry: Entry, name: str, reference: float, how: str) -> Entry:
 
 
 def is_rendered(camera: LensletCamera | None, ready: PreparedImage) -> bool:
-    """Whether raw images are of a camera 2.0: by the camera file, or by what the picture shows."""
+    """True if raw images are of a camera 2.0: by the camera file, or by the picture itself."""
     if camera is not None:
         return isinstance(camera, Rendered)
     assert ready.calibration is not None  # prepared with a white image

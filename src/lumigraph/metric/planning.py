@@ -1,4 +1,4 @@
-"""How to take pictures of a board: poses that tell the camera's lengths best, and how well."""
+"""Plans for pictures of a board: the poses that determine the camera's lengths best, and how well."""
 
 import math
 from collections.abc import Iterator
@@ -27,13 +27,13 @@ Turn = tuple[float, float, float]
 _TILTS = (0.0, 0.35, -0.35, 0.7, -0.7)  # rad: beyond, the squares are too narrow
 _STEEPEST = 0.8  # rad, about both axes together
 _ASLANT = math.radians(18)
-"""From edges in views to rows of lenslets: edges that run along them may be anywhere between two."""
+"""Angle from edges in views to rows of lenslets: edges that run along them may be anywhere between two."""
 
 _ROLLS = np.array(sorted(np.linspace(-0.8, 0.8, 65), key=abs))
 """Turns about the line of sight that are tried [rad], the smallest first."""
 
 KEPT_TO = (0.02, math.radians(5))
-"""How far pictures may be from a plan: of their distance, and in each angle [rad]."""
+"""Tolerances of a plan: in distance, relative, and in each angle [rad]."""
 
 _RATIOS = (0.08, 0.6)  # how far a corner moves against a lenslet, as `depth.correlation` looks for it
 _DISTANCES = 24
@@ -52,7 +52,7 @@ _SWAY = 0.01
 """Noise of how far a corner moves from view to view (see `Noise`)."""
 
 _SURE = (0.1, 0.3)
-"""Of L and b: how well they are known without any picture, over themselves."""
+"""Relative uncertainty of L and b without any picture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """Pictures of a board, the most telling first.
+    """Pictures of a board, the most informative first.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class Plan:
         return 1.96 * errors / np.append(self.camera.numbers[:3], 1.0)
 
     def enough(self, part: float) -> tuple[int | None, ...]:
-        """Pictures that tell f, L, b and distances to a part of themselves, in 95 of 100 cases.
+        """Numbers of pictures that determine f, L, b and distances to a part, in 95 of 100 cases.
 
         None where all pictures do not.
 
@@ -151,7 +151,7 @@ def plan(
     in_views: bool = False,
     noise_px: tuple[float, float] | None = None,
 ) -> Plan:
-    """Poses of a board, one after the other those that tell f, L and b best together.
+    """Poses of a board, one after the other those that determine f, L and b best together.
 
     Boards stand on the axis where three lenslets or more show each corner, straight or tilted; before a
     camera 1.0, where views over the stop move no corner by more than three lenslets, and turned about the
@@ -214,7 +214,7 @@ class _Shot:
 
 
 def _distances(camera: MetricCamera) -> list[float]:
-    """At which micro-images can be compared, from near to far, evenly in the image."""
+    """Distances at which micro-images can be compared, from near to far, evenly in the image."""
     f, low = camera.focal_length, 1.02 * camera.focal_length
     every = 1 / np.linspace(1 / low, 1 / (_FARTHEST * f), 400)
     image = f * every / (every - f)
@@ -230,7 +230,7 @@ def _distances(camera: MetricCamera) -> list[float]:
 
 
 def _in_views(camera: MetricCamera, pitch: float) -> list[float]:
-    """At which views are sharp and can be compared, from near to far, evenly in the image."""
+    """Distances at which views are sharp and can be compared, from near to far, evenly in the image."""
     f = camera.focal_length
     every = 1 / np.linspace(1 / (1.02 * f), 1 / (_FARTHEST * f), 400)
     points = np.stack([every, 0 * every, 0 * every], 1)
@@ -257,7 +257,7 @@ class _Before:
     in_views: bool
 
     def shots(self, distances: list[float], *, aslant: bool) -> list[_Shot]:
-        """Of boards straight and tilted, their edges aslant to rows or not, where all corners can be used."""
+        """Shots of boards, straight and tilted, aslant to rows or not, where all corners can be used."""
         tilts = [(y, x) for y, x in product(_TILTS, _TILTS) if math.hypot(y, x) <= _STEEPEST]
         every = (
             self.shot(distance, (self.roll(distance, *tilt) if aslant else 0.0, *tilt))
@@ -285,14 +285,14 @@ class _Before:
         return _Shot(distance, turn, len(seen), told)
 
     def pose(self, distance: np.ndarray, turn: np.ndarray) -> np.ndarray:
-        """(k, 6) Of boards whose middles are on the axis, at distances (k,), turned by (k, 3)."""
+        """Poses (k, 6) of boards whose middles are on the axis, at distances (k,), turned by (k, 3)."""
         still = np.concatenate([turn, np.zeros_like(turn)], 1)
         place = -geometry.moved(self.board.middle, still)
         place[:, 0] += distance
         return np.concatenate([turn, place], 1)
 
     def usable(self, distance: float, turn: Turn) -> bool:
-        """Whether a board can be found, also as far from its pose as it may be."""
+        """True if a board can be found, also as far from its pose as it may be."""
         sides = np.array([*product((-1, 1), repeat=4), (0, 0, 0, 0)])
         nearer, angle = KEPT_TO
         poses = self.pose(distance * (1 + nearer * sides[:, 0]), turn + angle * sides[:, 1:])
@@ -309,7 +309,7 @@ class _Before:
         return nearest(self.camera.project(points, axis))
 
     def whole(self, poses: np.ndarray) -> bool:
-        """Whether boards (k, 6) are in the picture with what finding them needs.
+        """True if boards (k, 6) are in the picture with what finding them needs.
 
         That are the outer squares and half a square of white margin; of chessboards in views the corners
         alone, and some lenslets around them.

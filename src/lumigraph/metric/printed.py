@@ -26,12 +26,12 @@ PAPERS = {
 """Short and long side [m]."""
 
 EDGE_TURN = math.radians(5)
-"""Of a slanted edge: ISO 12233."""
+"""Angle of a slanted edge: ISO 12233."""
 
 SPOKES = 36
 
 GROUPS = (-2, 1)
-"""Of USAF-1951: 0.25 to 3.56 line pairs per millimetre, which a printer can."""
+"""Groups of USAF-1951: 0.25 to 3.56 line pairs per millimetre, which printers resolve."""
 
 ROUND = 240
 """Corners of the polygons that are printed for circles: 0.01 % of their radius off."""
@@ -68,7 +68,7 @@ def chart(what: str | Board, paper: str | tuple[float, float] = "A4", *, turn: f
     GeometryError
         A chart that does not fit; the message says what does.
     LumigraphError
-        Markers without OpenCV, or of a dictionary that it has not.
+        Markers without OpenCV, or of a dictionary that it does not have.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def _sides(paper: str | tuple[float, float]) -> list[tuple[float, float]]:
 
 
 def _fitted(words: str, dark: list[np.ndarray], sides: list[tuple[float, float]], turn: float) -> "Drawing":
-    """On the first paper that it fits on, else an error."""
+    """Drawing on the first paper that it fits on, or an error."""
     from lumigraph.plots.sheets import room, sheet
 
     turned = [one @ _turning(turn) for one in dark]
@@ -129,12 +129,12 @@ def _fitted(words: str, dark: list[np.ndarray], sides: list[tuple[float, float]]
     raise GeometryError(
         f"the chart ({words}) is {_size(need)} but the paper has room for "
         f"{' or '.join(_size(room(paper)) for paper in sides)}. Make it {math.floor(100 * max(parts))} % as "
-        "large, or take other paper."
+        "large, or use other paper."
     )
 
 
 def _turning(angle: float) -> np.ndarray:
-    """What turns rows of (y, x) from +x towards +y."""
+    """Rotation (2, 2) of rows of (y, x) from +x towards +y."""
     return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
 
 
@@ -152,7 +152,7 @@ def _told(words: str, turn: float = 0.0) -> str:
 
 
 def _board_parts(board: Board) -> list[np.ndarray]:
-    """Of a board about its middle."""
+    """Polygons of a board about its middle."""
     down, across = board.shape
     if board.pattern in ("dots", "asymmetric dots"):
         angle = np.arange(ROUND) * 2 * math.pi / ROUND

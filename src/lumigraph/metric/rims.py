@@ -1,9 +1,9 @@
-"""How far micro-images of a camera 2.0 show corners outwards of where rays put them.
+"""Outward displacement of corners in micro-images of a camera 2.0, against rays.
 
 Toward the rim of a micro-image the main lens' stop cuts the beam of its lenslet, within the width of the
-lenslet's diffraction, and light of neighbours comes in. Division by a white image mends how bright it is, not
-that what is cut off comes from one side of each edge. So edges are found outwards: by 0.005 px at a third of
-the radius, and by 0.05 px at two thirds, behind lenslets of 120 µm at f/20.
+lenslet's diffraction, and light of neighbours comes in. A white image corrects the brightness, not the
+one-sided loss. So edges are found outwards: by 0.005 px at a third of the radius, and by 0.05 px at two
+thirds, behind lenslets of 120 µm at f/20.
 """
 
 import math
@@ -35,7 +35,7 @@ _REACH = 14  # px: from a pixel to the farthest places whose light it is told; w
 
 @lru_cache(maxsize=16)
 def outwards(waves: Waves, pitch: float, slopes: tuple[float, ...]) -> RegularGridInterpolator:
-    """How far [px] corners are found outwards, over the way from the middle [px] and the logarithm of slopes.
+    """Outward displacement of corners [px], by distance from the middle [px] and logarithm of slopes.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def outwards(waves: Waves, pitch: float, slopes: tuple[float, ...]) -> RegularGr
 
 
 def _directions(waves: Waves) -> Iterator[np.ndarray]:
-    """Along a row of lenslets, and halfway to the next."""
+    """Unit vectors along a row of lenslets, and halfway to the next."""
     row = np.array(waves.basis[0]) / math.hypot(*waves.basis[0])
     for turn in (0.0, np.arccos(waves.basis[0] @ np.array(waves.basis[1])) / 2):
         yield np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ row

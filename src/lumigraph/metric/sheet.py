@@ -1,4 +1,4 @@
-"""What a data sheet holds: entries with their intervals and how they were measured."""
+"""Data sheets: entries with their intervals and how they were measured."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -36,7 +36,7 @@ class Entry:
 
     @property
     def value(self) -> Any:
-        """Of the quantity."""
+        """Value of the quantity."""
         return self.quantity.value
 
     @property
@@ -62,7 +62,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plane:
-    """What was measured on one picture of the chart.
+    """Measures of one picture of the chart.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class Plane:
 
     @property
     def label(self) -> str:
-        """Where the chart stood."""
+        """Position of the chart, as text."""
         return "unknown" if self.depth is None else str(Quantity("depth", self.depth, "m"))
 
 
@@ -129,7 +129,7 @@ class Sheet:
         return tuple(one.quantity for one in self.entries if one.value is not None)
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """What programs read: one mapping for each entry, planes' with their depth [m]."""
+        """Rows for programs: a mapping for each entry, those of planes with their depth [m]."""
         lists: list[tuple[float | None, Sequence[Entry]]] = [(None, self.entries)]
         for depth, entries in lists + [(plane.depth, plane.entries) for plane in self.planes]:
             for one in entries:
@@ -142,7 +142,7 @@ class Sheet:
 
 
 def _on_chart(q: Quantity) -> Quantity:
-    """Of line pairs a metre, in line pairs a millimetre."""
+    """Quantity in line pairs per millimetre, from line pairs per metre."""
     ends = None if q.interval is None else (q.interval[0] / 1e3, q.interval[1] / 1e3)
     return Quantity(q.name, q.value / 1e3, "lp/mm", ends)
 

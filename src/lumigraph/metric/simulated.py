@@ -1,4 +1,4 @@
-"""What a camera's description promises, measured on a picture of a chart that is simulated through it."""
+"""Measures of a camera's description, on a simulated picture of a chart."""
 
 import re
 from collections.abc import Sequence
@@ -20,14 +20,14 @@ from lumigraph.preparation import decode, prepare
 from lumigraph.rendering import refocus
 
 MEASURES = ("mtf50_middle", "mtf50_border", "mtf10_middle", "mtf10_border", "sample_on_chart", "distortion")
-"""What is measured, and the contrast ``mtf@F/mm`` of F cycles per millimetre of the object, in the middle."""
+"""Measures, and the contrast ``mtf@F/mm`` of F cycles per millimetre of the object, in the middle."""
 
 _ACCURACY = 1e-3  # cameras that differ little are compared
 _CONTRAST = re.compile(r"mtf@(\d+\.?\d*)/mm")
 
 
 def is_measure(name: str) -> bool:
-    """Whether `simulated` measures something of this name.
+    """True if `simulated` measures something of this name.
 
     >>> is_measure("mtf@10/mm"), is_measure("mtf50_middle"), is_measure("mtf@10")
     (True, True, False)
@@ -82,7 +82,7 @@ def simulated(
 def _measured(
     camera: LensletCamera, names: Sequence[str], dz: float, rng: np.random.Generator
 ) -> dict[str, Quantity]:
-    """Of a chessboard at a depth; its squares suit that alone."""
+    """Measures of a chessboard at a depth, with squares that suit it."""
     charts = Lights.of(camera, (dz,), textured=False, accuracy=_ACCURACY).exposed(rng, exposures=1)
     spacing = charts.spacing
     assert spacing is not None  # it is simulated
@@ -100,7 +100,7 @@ def _measured(
 
 
 def _alpha(camera: LensletCamera, dz: float) -> float:
-    """Of a refocused picture: the lenslets' distance behind the main lens, over that of a depth's image."""
+    """Refocus factor of a depth: the lenslets' distance behind the main lens over the image's."""
     focus = 1 / camera.main_lens.focal_length
     return (focus - 1 / camera.defocused(dz)) / (focus - 1 / camera.object_distance)
 

@@ -1,12 +1,10 @@
-"""Light that lenslets spread and spill, and what it does to corners of boards.
+"""Displacement of board corners by light that lenslets spread and spill.
 
 Behind each lenslet stands a picture of the main lens' stop, spread by diffraction at the lenslet's opening
-(`lumigraph.metric.waves`). At a way from the middle of a micro-image of a camera 1.0 is light from lenslets
-beside it, too, which a view takes for its own lenslet's from that direction. So a part of each corner that it
-shows stands aside, and the corner is found aside: a point's image is as wide as λ over the stop's angle, and
-what spills comes from points that are imaged on lenslets' rims. Edges are found where `analysis.crossings`
-fits them to the light: what is farther aside than the edge is soft pulls no more. In micro-images of a
-camera 2.0 corners are found outwards (`lumigraph.metric.rims`).
+(`lumigraph.metric.waves`). Away from the middle of a micro-image of a camera 1.0 there is light of
+neighbouring lenslets, too, which a view takes for its own lenslet's: corners are displaced. Edges are found
+where `analysis.crossings` fits them to the light: light farther away than the edge is soft has no effect. In
+micro-images of a camera 2.0 corners are found outwards (`lumigraph.metric.rims`).
 """
 
 import itertools
@@ -40,7 +38,7 @@ NARROW, _APART = 0.1, 1.1
 to it, within 4 % down to 0.015."""
 
 _UNSURE, _UNSURE_BEHIND, _UNSURE_EDGE = 0.15, 0.4, 0.2
-"""Of what is taken out, over itself: by wave optics, up to 0.009 of 0.065 is left from view to view; in
+"""Relative uncertainty of the correction: by wave optics, up to 0.009 of 0.065 is left from view to view; in
 micro-images of a camera 2.0, where the stop's width is taken from `Calibration.fill` and the lenslets' focus
 from the corners, by 2 % and 10 to 30 %; and where both follow from edges on a white image, within 0.6 %.
 """
@@ -59,7 +57,7 @@ _ROUNDS = 8
 
 @dataclass(frozen=True, slots=True)
 class Spill:
-    """What it depends on, but for the lenslets' distance from the sensor.
+    """Model of the light that lenslets spill, but for their distance from the sensor.
 
     Parameters
     ----------
@@ -71,10 +69,10 @@ class Spill:
         Of the light [m].
     sharp
         How far micro-images of a point in focus move, over the way from lenslet to lenslet; 0 of a camera
-        1.0. Where the edge is known it only tells whether they look at an image behind them.
+        1.0. Where the edge is known only its sign counts: whether the image lies behind the lenslets.
     edges
         Width and blur of micro-images on a white image, over their pitch (`analysis.pupil_edge`), of each
-        kind of lenslets, or of all: they tell the stop's width and what is in focus. Empty if not measured.
+        kind of lenslets, or of all: they give the stop's width and the focus. Empty if not measured.
 
     Raises
     ------
@@ -101,7 +99,7 @@ class Spill:
         return self.wavelength * camera.lenslet_distance / lenslets / apart
 
     def unsure(self, camera: "MetricCamera") -> float:
-        """How well it is known how far corners are moved, over that: one standard deviation."""
+        """Relative uncertainty of the displacement of corners: one standard deviation."""
         if not self.sharp:
             return _UNSURE
         if not self.edges:
@@ -122,7 +120,7 @@ class Spill:
         return round(self.lattice.pitch, 1)
 
     def aside(self, way: np.ndarray, slope: np.ndarray, width: float) -> np.ndarray:
-        """How far (n, 2) [px] views at ways (n, 2) [px] show corners aside.
+        """Displacement (n, 2) of corners in views at ways (n, 2) [px].
 
         Parameters
         ----------
@@ -145,7 +143,7 @@ class Spill:
         return table(np.column_stack([ways, slope])) @ axes * pitch * (width / computed)
 
     def outwards(self, way: np.ndarray, moved: np.ndarray, width: float, kind: np.ndarray) -> np.ndarray:
-        """How far (n, 2) [px] micro-images of a camera 2.0 show corners at ways (n, 2) [px] aside.
+        """Displacement (n, 2) [px] of corners at ways (n, 2) [px] in micro-images of a camera 2.0.
 
         Parameters
         ----------
@@ -177,12 +175,12 @@ class Spill:
         return rims.outwards(told, apart, slopes)
 
     def _axes(self) -> np.ndarray:
-        """Along the lattice's rows, and across them (2, 2)."""
+        """Unit vectors (2, 2) along the lattice's rows, and across them."""
         down, right = self.lattice.basis[0]
         return np.array([(down, right), (right, -down)]) / self.lattice.pitch
 
     def _waves(self, width: float) -> Waves:
-        """Of a lattice whose rows run along the first axis."""
+        """Waves behind a lattice whose rows run along the first axis."""
         lenslets = (np.array(self.lattice.basis) @ self._axes().T / self.lattice.pitch).round(9).tolist()
         return Waves(width, self.fill, tuple(map(tuple, lenslets)), self.sharp)
 
@@ -194,13 +192,13 @@ def _close(width: float) -> float:
 
 @lru_cache(maxsize=16)
 def _filled(waves: Waves) -> Waves:
-    """With the stop whose micro-images are seen to fill as much as its own do."""
+    """Waves with the stop whose micro-images are seen to fill as much as its own do."""
     return replace(waves, fill=2 * waves.fill - waves.seen_fill())
 
 
 @lru_cache(maxsize=16)
 def _edged(waves: Waves, edge: Pair, pitch: float) -> Waves:
-    """With the stop and the focus whose micro-images have this edge."""
+    """Waves with the stop and the focus whose micro-images have this edge."""
     sign = math.copysign(1.0, waves.sharp)
 
     def off(told: np.ndarray) -> np.ndarray:
@@ -215,13 +213,13 @@ def _edged(waves: Waves, edge: Pair, pitch: float) -> Waves:
 
 @lru_cache(maxsize=16)
 def _nearest(waves: Waves, edge: Pair, pitch: float) -> Pair:
-    """To an edge, of those that such waves make."""
+    """Nearest edge that such waves make."""
     return _edged(waves, edge, pitch).edge(pitch)
 
 
 @lru_cache(maxsize=16)
 def _table(waves: Waves, reach: int, slopes: tuple[int, int]) -> RegularGridInterpolator:
-    """What `_Waves.aside` gives, of ways up to so many steps and slopes from one to another."""
+    """Table of `_Waves.aside`, for ways up to so many steps and slopes from one to another."""
     line = np.arange(-max(reach, 2), max(reach, 2) + 1) * _WAYS
     moved = np.arange(slopes[0], slopes[1] + _SLOPES / 2, _SLOPES)
     ways = np.stack(np.meshgrid(line, line, indexing="ij"), -1).reshape(-1, 2)
@@ -243,7 +241,7 @@ def _views(waves: Waves, way: np.ndarray, slopes: np.ndarray) -> np.ndarray:
 
 
 def _edge(light: np.ndarray, at: np.ndarray) -> float:
-    """Where an edge is found in light (n,) that each point at (n,) gives [pitches]."""
+    """Position of an edge that is found in light (n,) of points at (n,) [pitches]."""
     place = 0.0
     for _ in range(_ROUNDS):
         place += float(light @ _half(at - place) / light.sum()) * _PULL
@@ -251,7 +249,7 @@ def _edge(light: np.ndarray, at: np.ndarray) -> float:
 
 
 def _half(way: np.ndarray) -> np.ndarray:
-    """How much of a soft edge, sampled by lenslets, lies on the near side of a way: -1/2 to 1/2."""
+    """Part of a soft edge, sampled by lenslets, on the near side of a way: -1/2 to 1/2."""
     ends = np.stack([way + 0.5, way - 0.5])
     risen = ends * erf(ends / (math.sqrt(2) * _SOFT)) + _SOFT * math.sqrt(2 / np.pi) * np.exp(
         -0.5 * (ends / _SOFT) ** 2
@@ -260,4 +258,4 @@ def _half(way: np.ndarray) -> np.ndarray:
 
 
 _PULL = 1 / float((np.diff(_half(np.arange(-3, 3, 0.01))) ** 2).sum() / 0.01)
-"""How far an edge moves with each part of light that is on one side of it [pitches]."""
+"""Shift of an edge for each part of light on one side of it [pitches]."""

@@ -1,4 +1,4 @@
-"""A first camera and first poses, without any guess but a focal length: a search over two lengths.
+"""First camera and poses by a search over two lengths, from nothing but a focal length.
 
 Where a corner shows behind lenslets is linear in their places, s = A c + t: A says how far its image is from
 the lenslets, in lenslet distances, and t where. Any pair (L, b) makes points in space of these; the right one

@@ -21,7 +21,7 @@ TRUSTED = 0.5
 """Confidence from which on a place counts for depth."""
 
 REPEATED = 2.0
-"""Per cent by which two sheets of a camera may differ: from there on, more exposures are asked for."""
+"""Per cent by which two sheets of a camera may differ: beyond it the sheet recommends more exposures."""
 
 _BLOCKS = 4
 """Pieces of the field along each axis: places closer together do not err independently."""
@@ -32,7 +32,7 @@ _TO_SIGMA = 1.4826  # of a normal distribution, over the median distance from it
 
 
 def inner(values: np.ndarray) -> np.ndarray:
-    """Without the outermost tenth of the field."""
+    """Values of the field without its outermost tenth."""
     return values[tuple(slice(n // 10, n - n // 10) for n in values.shape)]
 
 
@@ -66,7 +66,7 @@ def mean_within(values: Sequence[float] | np.ndarray) -> tuple[float, tuple[floa
 
 
 def without_strays(values: Sequence[float]) -> list[float]:
-    """Those nearer to the median than `_STRAY` standard deviations, told by the others; all of a few."""
+    """Values nearer to the median than `_STRAY` standard deviations by the others; all of a few."""
     known = np.array(values, float)
     away = np.abs(known - np.median(known))
     near = away <= _STRAY * _TO_SIGMA * np.median(away)
@@ -134,7 +134,7 @@ def _squares(values: np.ndarray) -> np.ndarray:
 
 
 def _parts(values: np.ndarray, told: Callable[[np.ndarray], Any]) -> np.ndarray:
-    """What is told of each piece of the field; NaN of those that have fewer than three known values."""
+    """Value of each piece of the field by a function; NaN for those with fewer than three known values."""
     pieces = [
         part[np.isfinite(part)]
         for rows in np.array_split(values, _BLOCKS, axis=0)
@@ -144,13 +144,13 @@ def _parts(values: np.ndarray, told: Callable[[np.ndarray], Any]) -> np.ndarray:
 
 
 def _over(parts: Sequence[np.ndarray]) -> np.ndarray:
-    """Of pieces (n,) of each exposure, the means over exposures of those that all know."""
+    """Means over exposures of those pieces (n,) that all exposures know."""
     together = np.mean(parts, axis=0)
     return together[np.isfinite(together)]
 
 
 def _apart(values: Sequence[float]) -> float | None:
-    """How far two means of as many exposures differ at most, in 95 of 100 cases, by how single ones do."""
+    """Largest difference of two means of as many exposures, in 95 of 100 cases, by their scatter."""
     n = len(values)
     if n < 2:
         return None
@@ -159,7 +159,7 @@ def _apart(values: Sequence[float]) -> float | None:
 
 def _repeats(apart: float | None, count: int, unit: str) -> str:
     if apart is None:
-        return "one exposure, so that nobody knows how well it repeats"
+        return "one exposure, so that its repeatability is unknown"
     told = f"{count} exposures, two such sets differ by {apart:.2g} {unit} at most"
     if unit == "%" and apart > REPEATED:
         told += f" ({math.ceil(count * (apart / REPEATED) ** 2)} exposures: {REPEATED:g} %)"

@@ -117,7 +117,7 @@ def triangulate(
 
 
 def _first(measured: Measured, place: np.ndarray, center: np.ndarray, in_views: bool) -> np.ndarray:
-    """Where the rays meet, without distortion."""
+    """Intersection of the rays, without distortion."""
     camera = measured.camera
     sight = np.zeros(len(place), int)
     slope, shift, _ = lines(place - camera.axis, center - camera.axis, sight, in_views)

@@ -1,18 +1,12 @@
-r"""What is out of place on a bench, by its white images: `twin` compares them with those of the camera file.
+r"""Misalignment of a bench by its white images: `twin` compares them with those of the camera file.
 
-White images of the camera file are simulated by its operator, with the array moved, turned and the stop
-opened a little, and measured exactly as the real ones: lattice, its slope over the picture, width and blur of
-micro-images. Differences y and derivatives J give what is out of place, by Gauss and Newton,
+White images of the camera file are simulated with small misalignments and measured as the real ones are.
+Differences y and derivatives J give the causes, by Gauss and Newton,
 
 .. math:: x = (J^T C^{-1} J)^{-1} J^T C^{-1} (y - y_0)
 
-What an array does when it is moved and turned follows from rays through the middle of the main lens' stop:
-at s on the sensor stands what an array at its place shows at
-
-.. math:: s_0 = \frac{s}{1 + \tan\theta \cdot s / (L + b)} ,
-
-drawn out by 1/cos θ along the tilt. A tilted sensor before an upright array looks the same but for that
-factor: which of the two is out of place no white image tells, and the array is taken to be.
+A tilted sensor before an upright array looks like a tilted array; the array is taken to be tilted.
+Rays through a moved and turned array: docs/theory/metric.md.
 """
 
 import math
@@ -42,7 +36,7 @@ from lumigraph.instruments.capabilities import Rendered
 from lumigraph.operators.white import white_image
 
 CAUSES = ("height", "tilt_y", "tilt_x", "shift_y", "shift_x", "turn", "aperture")
-"""What may be out of place.
+"""Possible misalignments.
 
 - height: of the array above its place, away from the sensor [m]
 - tilt: of the array, positive where it is farther from the sensor at larger y (x) of the raw image [rad]
@@ -57,9 +51,9 @@ SURE = 3.0
 """Standard deviations from which on an instruction is given."""
 
 PITCH_ERROR = 3e-4
-"""Of the lenslets' pitch over the pixels', one standard deviation, unless one is given.
+"""Standard deviation of the lenslets' pitch over the pixels', unless one is given.
 
-A moulded array's scale changes by 7e-5 a kelvin (PMMA), and no white image tells it from the array's height.
+A moulded array's scale changes by 7e-5 a kelvin (PMMA), which white images cannot separate from its height.
 """
 
 _STEPS = (50e-6, 2e-3, 2e-3, 3e-6, 3e-6, 2e-3, 0.01)  # of the derivatives
@@ -69,12 +63,12 @@ _ROUNDS = 3
 _BLUR = 0.03  # part by which the blur of micro-images may differ before it is a cause of its own
 _ACCURACY = 1e-3
 _FARTHEST = 0.1
-"""Of the lenslets' distance from the sensor: an array that is farther from its place is another camera."""
+"""Largest misplacement of an array, over its distance from the sensor: beyond, it is another camera."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shown:
-    """What a white image shows: two lattice vectors, origin and slope [px], width and blur [px]."""
+    """Measures of a white image: two lattice vectors, origin and slope [px], width and blur [px]."""
 
     values: np.ndarray
     errors: np.ndarray
@@ -82,7 +76,7 @@ class _Shown:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Twin:
-    """What is out of place on a bench.
+    """Misalignment of a bench.
 
     Parameters
     ----------
@@ -126,7 +120,7 @@ class Twin:
         return (*found, blur, Quantity("misfit_probability", self.misfit))
 
     def instructions(self) -> tuple[str, ...]:
-        """What to do on the bench, the surest first; nothing that is not three standard deviations from 0."""
+        """Instructions for the bench, the surest first; none for values within three deviations of 0."""
         sure = np.abs(self.values) / np.maximum(self.errors, 1e-300)
         found = zip(CAUSES, self.values.tolist(), (1.96 * self.errors).tolist(), strict=True)
         told = [_told(*one) for one in found]
@@ -171,7 +165,7 @@ class Bench:
     camera: LensletCamera
 
     def white(self, values: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Its white image (y, x) by wave optics, with `CAUSES` of these values."""
+        """White image (y, x) of the misaligned camera by wave optics, with `CAUSES` of these values."""
         height, tilt_y, tilt_x, shift_y, shift_x, turn, aperture = (float(v) for v in values)
         optics = self.camera.optics()
         b, L = optics.lenslet_distance, optics.separation
@@ -198,7 +192,7 @@ class Bench:
 
     @cached_property
     def start(self) -> _Shown:
-        """What the white image of the camera file shows."""
+        """Measures of the white image of the camera file."""
         return shown(self.white(np.zeros(len(CAUSES))))
 
     @cached_property
@@ -286,7 +280,7 @@ def twin(
     pitch_error: float | None = None,
     progress: Progress = silent,
 ) -> Twin:
-    """What is out of place, by white images of one state of the bench.
+    """Misalignment by white images of one state of the bench.
 
     Parameters
     ----------
@@ -350,14 +344,14 @@ def _far(height: float, b: float) -> tuple[str, ...]:
     if abs(height) <= _FARTHEST * b:
         return ()
     return (
-        f"the pitch of the micro-images asks for an array {abs(height) * 1e3:.3g} mm from its place, "
+        f"the pitch of the micro-images implies an array {abs(height) * 1e3:.3g} mm from its place, "
         f"{b * 1e3:.4g} mm above the sensor: more likely the camera file's pitch, pixels or distances "
         "are wrong, so height and stop have no instructions",
     )
 
 
 def _of_pitch(covariance: np.ndarray) -> Iterator[str]:
-    """What height and stop rest on if nobody says how well the pitch is known."""
+    """Remark on the height and the stop where the error of the pitch is not given."""
     height, stop = 1.96 * np.sqrt(covariance[[0, -1], [0, -1]])
     yield (
         f"the lenslets' pitch over the pixels' is taken as known to {PITCH_ERROR:.2%}, so the height is known"

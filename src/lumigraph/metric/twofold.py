@@ -67,5 +67,5 @@ def _rms(residual: np.ndarray) -> float:
 
 
 def _cost(found: Adjusted, beside: Adjusted) -> float:
-    """Of all residuals, wild ones too, over the typical one of another adjustment."""
+    """Cost of all residuals, wild ones too, over the typical one of another adjustment."""
     return float(np.log1p((found.residual / max(_rms(beside.residual), 1e-6)) ** 2).sum())

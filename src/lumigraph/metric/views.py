@@ -19,7 +19,7 @@ from lumigraph.preparation import decode, of_raw
 from lumigraph.rendering.geometry import raw_places
 
 LEAST_VIEWS = 5
-"""In which a corner must be seen."""
+"""Views in which a corner must be seen."""
 
 DIRECTIONS = 7
 """Views along an axis: the fewer, the less noise and the less of it is shared."""
@@ -64,7 +64,7 @@ def on_picture(raw: RawImage, calibration: Calibration, board: Board, frame: int
 
 
 def reach(calibration: Calibration, count: int) -> float:
-    """How far from a micro-image's centre the middles of `count` views may be: wholly inside the rim [px]."""
+    """Largest distance of the middles of `count` views from a micro-image's centre, inside the rim [px]."""
     pitch = calibration.lattice.pitch
     return (calibration.fill or 1.0) * pitch / 2 - _RIM - pitch / count / math.sqrt(2)
 
@@ -85,7 +85,7 @@ def _board(middle: np.ndarray, board: Board, what: str) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Track:
-    """Where n corners are in m views: `places` (n, m, 2) [samples], NaN where they were not found."""
+    """Places (n, m, 2) of n corners in m views [samples], NaN where they were not found."""
 
     first: np.ndarray
     radius: int
@@ -107,7 +107,7 @@ class _Track:
         self.places[kept & inside, k] = at[kept & inside]
 
     def straight(self, way: np.ndarray) -> np.ndarray:
-        """Which places (n, m) are on their corner's line; none of corners that too few views show."""
+        """Mask (n, m) of places on their corner's line; none for corners that too few views show."""
         for _ in range(3):
             middle, slope = self._lines(way)
             off = np.hypot(*np.moveaxis(self.places - middle[:, None] - slope[:, None, None] * way, -1, 0))

@@ -1,16 +1,7 @@
 r"""Waves of a point that lenslets spread over their own micro-image and their neighbours'.
 
-Main lens and lenslets act on the same waves. Of a point at c, what stands at a way w from the middle of a
-micro-image is
-
-.. math::
-    A(c) = \int S(u) e^{-i \pi \sigma u^2 / \lambda} e^{-2\pi i u c / \lambda}
-    \sum_k e^{i \pi (w - k)^2 / \lambda + 2\pi i u k / \lambda} \hat h(u - w + k) \,\mathrm{d}u
-
-over the main lens' stop S, with lengths in pitches, λ short for λ b/d², k the lenslets, and ĥ the transform
-of the field behind a lenslet, which reaches to its neighbours. That is flat where a point at infinity is in
-focus; where one is whose micro-images move by s of the way from lenslet to lenslet, it is curved by π s t²/λ.
-Rays put all the light at c = -σ w.
+Main lens and lenslets act on the same waves. Lengths are in pitches, and `width` is λ b/d². The integral over
+the main lens' stop is derived in docs/theory/metric.md.
 """
 
 import math
@@ -55,14 +46,14 @@ class Waves:
     sharp: float = 0.0
 
     def directions(self, across: int) -> np.ndarray:
-        """(y, x, 2) So close that light is told over so many lenslets."""
+        """Directions (y, x, 2), close enough to cover so many lenslets with light."""
         step = self.width / across
         half = int(self.fill / 2 / step) + 1
         line = np.arange(-half, half + 1) * step
         return np.stack(np.meshgrid(line, line, indexing="ij"), -1)
 
     def light(self, u: np.ndarray, field: np.ndarray, slope: float) -> tuple[np.ndarray, np.ndarray]:
-        """Of points (..., y, x), and where they are along either axis, by fields in directions u."""
+        """Light of points (..., y, x) by fields in directions u, and their places along either axis."""
         step, count = float(u[1, 0, 0] - u[0, 0, 0]), 2 * len(u)
         bent = self.stop(u) * np.exp(-1j * np.pi * slope / self.width * (u**2).sum(-1))
         found: Any = fft2(field * bent.astype(field.dtype), (count, count))

@@ -13,12 +13,12 @@ _PART = 0.42
 """Half the window about a corner, over the way to the nearest other one: no window holds two."""
 
 _RIM = 0.5
-"""By how much a window is wider than a dot [px]: it holds the edge, and fits into most micro-images."""
+"""Width of a window beyond a dot's [px]: it holds the edge, and fits into most micro-images."""
 
 _MOST = 6  # px, of those about corners
 
 LEAST_SQUARE = 5.7
-"""Of a board behind a lenslet [px], or in a view [samples]: squares, or the way between dots."""
+"""Least square of a board, or distance between dots, behind a lenslet [px] or in a view [samples]."""
 
 
 def ways(places: np.ndarray) -> np.ndarray:
@@ -32,7 +32,7 @@ def nearest(places: np.ndarray) -> float:
 
 
 def radius(ways: np.ndarray, board: Board, frame: int, where: str) -> int:
-    """Of the windows about places of a board, by the way from each to the nearest (n,) [px].
+    """Radius of the windows about places of a board, by the way from each to the nearest (n,) [px].
 
     Raises
     ------

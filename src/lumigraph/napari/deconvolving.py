@@ -1,5 +1,5 @@
 # pyright: reportMissingImports=false
-"""Widget: what was in front of a microscope or a focused camera, from one raw image."""
+"""Widget: the object before a microscope or a focused camera, from one raw image."""
 
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,5 @@
 # pyright: reportMissingImports=false
-"""What the widgets share: choices of layers, a button, progress, and what was found."""
+"""Common parts of the widgets: choices of layers, a button, progress, and the result."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -46,15 +46,15 @@ class Panel(Container):
             event.connect(self._refresh)
 
     def job(self) -> Job:
-        """What is to be computed, from what the controls say; called in the main thread."""
+        """Job to compute, by the controls; called in the main thread."""
         raise NotImplementedError  # each verb's panel has its own
 
     def take(self, found: Any) -> str:
-        """Show what was found, and say it in a line."""
+        """Show the result, and summarise it in a line."""
         raise NotImplementedError  # each verb's panel has its own
 
     def start(self) -> None:
-        """Compute, unless a computation goes on; what is wrong with the controls is said at once."""
+        """Compute, unless a computation is running; wrong controls are reported at once."""
         if self.work.is_running:
             return
         try:
@@ -111,7 +111,7 @@ class Panel(Container):
 
 
 def chosen(box: ComboBox, kind: type, what: str) -> Any:
-    """What the chosen layer holds.
+    """Noun that the chosen layer holds.
 
     Raises
     ------

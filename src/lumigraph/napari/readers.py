@@ -1,4 +1,4 @@
-"""Whatever `lumigraph.open` reads, as layers."""
+"""Files that `lumigraph.open` reads, as layers."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

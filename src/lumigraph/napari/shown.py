@@ -15,14 +15,14 @@ from lumigraph.core.raw import RawImage
 from lumigraph.errors import FormatError
 
 KEY = "lumigraph"
-"""Where a layer's metadata hold what it was made of."""
+"""Key of a layer's metadata that holds the noun it was made of."""
 
 _MICRO = {"meter": 1.0, "millimeter": 1e-3, "micrometer": 1e-6, "nanometer": 1e-9}
 _SURE = (1, 99)  # percentiles that the colours of a depth map span
 
 
 def layer_of(thing: Any, name: str) -> LayerData:
-    """What napari shows of a noun.
+    """Layer of a noun, as napari shows it.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def depth_beside(views: LightField, found: DepthMap, name: str) -> LayerData:
 
 
 def held(layer: Any, kind: type) -> Any:
-    """What a layer was made of, of this kind; an image of two axes counts as a raw image. Else None."""
+    """Noun that a layer was made of, of this kind; an image of two axes counts as a raw image. Else None."""
     noun = layer.metadata.get(KEY)
     if isinstance(noun, kind):
         return noun

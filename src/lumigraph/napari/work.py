@@ -1,5 +1,5 @@
 # pyright: reportMissingImports=false
-"""A computation in a thread of its own, with its progress, which can be stopped."""
+"""A computation in a separate thread, with its progress, which can be stopped."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,7 +16,7 @@ Job = Callable[[Progress], Any]
 
 
 class Stopped(KeyboardInterrupt):
-    """The computation was to stop: raised inside it, where it tells its progress."""
+    """Raised inside a computation that is to stop, where it reports its progress."""
 
 
 class Work:
@@ -29,7 +29,7 @@ class Work:
     failed
         Called in the main thread with the error.
     shown
-        Called in the main thread with the fraction that is done and what goes on.
+        Called in the main thread with the fraction that is done and the present step.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class Work:
 
     @property
     def is_running(self) -> bool:
-        """Whether a computation goes on."""
+        """True while a computation runs."""
         return self._worker is not None
 
     def start(self, job: Job) -> None:
@@ -58,7 +58,7 @@ class Work:
         self._worker.start()
 
     def stop(self) -> None:
-        """Let the computation end where it next tells its progress; its result does not count then."""
+        """Stop the computation at its next report of progress; its result does not count then."""
         self._stop = True
 
     def _run(self, job: Job) -> tuple[Any, BaseException | None]:

@@ -68,7 +68,7 @@ class Beyond:
 
 
 def beyond(optics: Optics, grid: Grid, glare: Glare) -> Beyond | None:
-    """Of an object's samples; None where all of them lie in cells whose points have images of their own."""
+    """Light of an object's samples beyond the cells with separate images of points; None if there is none."""
     cells, scale = optics.cells, optics.camera.separation / optics.distance
     sin, cos = abs(math.sin(optics.rotation)), abs(math.cos(optics.rotation))
     height, width = (

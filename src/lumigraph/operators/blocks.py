@@ -1,17 +1,12 @@
 """Matrices between the cells of a lenslet array, in factors.
 
-Inside the array all cells have the same blocks. Near its border light is missing that lenslets beyond it
-would have brought: from all cells of a row alike, from all of a column, and in the corners from both, which
-is not the sum of the two where the missing lenslets are near. So
+Inside the array all cells have the same blocks. Near its border light of lenslets beyond it is missing:
 
 .. math:: B(a, b) = B + [B(a, ∞) - B] + [B(∞, b) - B] + [B(a, b) - B(a, ∞) - B(∞, b) + B]
 
-for a cell at a from the border along y and b along x, and the last bracket is left out far from corners.
-Cells of the ring around the array have only what is brought there.
-
-Singular values are kept until the accuracy is reached; inside the array the light of what is left out is
-given to all points of its cell alike, so that an even object stays exact. Blocks that mirror each other are
-computed once.
+for a cell at a from the border along y and b along x; the last bracket is left out far from corners. Singular
+values are kept until the accuracy is reached; inside the array the light of what is left out is given to all
+points of its cell alike, so that an even object stays exact. See docs/theory/periodic.md.
 """
 
 import math
@@ -128,7 +123,7 @@ def _ranks(blocks: Blocks) -> int:
 
 
 def _parts(cells: _cells.Cells, mine: Iterable[Place], blocks: Blocks) -> Iterator[Part]:
-    """Of places that have the same blocks: their factors are the same arrays."""
+    """Parts of places that have the same blocks: their factors are the same arrays."""
     lit = (key for key, (left, _) in blocks.items() if left.shape[1])
     order = sorted(lit, key=lambda key: (key[0], key[1] % cells.kinds, key[1]))
     left = np.concatenate([blocks[key][0].T for key in order], axis=0, dtype=np.float32).T
@@ -162,7 +157,7 @@ class Builder:
         self.chosen: dict[int, dict[Offset, Chosen]] = {}
 
     def periodic(self) -> tuple[list[Blocks], list[Means]]:
-        """For each kind: blocks inside the array, and the mean images (samples,) of a cell's points."""
+        """Blocks inside the array, and the mean images (samples,) of a cell's points, for each kind."""
         found, kinds = [], self.optics.cells.kinds
         for kind in range(kinds):
             found.append(self._completed(*self._inside(State(INFINITE, INFINITE, kind))))
@@ -266,12 +261,12 @@ class Builder:
         return ranks, parts()
 
     def forget(self) -> None:
-        """Let go what only computing needs."""
+        """Release the arrays that only computing needs."""
         self.apart, self.chosen = None, {}
         memory.give_back()
 
     def _border_blocks(self, wanted: Sequence[Place]) -> dict[Place, Blocks]:
-        """Of some places: row after row of cells, so that what they share is computed once."""
+        """Blocks of some places: row after row of cells, so that what they share is computed once."""
         # A row of cells is a small part of the picture: its error may be larger.
         budget = (SHARE * self.optics.fineness.rank) ** 2 * self.norm
         result, pieces = {}, self._row_by_row if self.apart is None else self._kind_by_kind
@@ -306,7 +301,7 @@ class Builder:
     def _missing(
         self, wanted: Sequence[Place], chosen: dict[Offset, Chosen], progress: Progress
     ) -> Iterator[tuple[Place, dict[Offset, Found]]]:
-        """Of places of one kind: the images of some offsets with all lenslets that are missing anywhere."""
+        """Blocks of places of one kind: images of some offsets with all sets of missing lenslets."""
         assert self.apart is not None  # asked by the caller
         cells, lit = self.optics.cells, {key: points for key, points in chosen.items() if len(points.numbers)}
         missing = Missing(self.lenslets, self.apart, cells, lit, states_of(wanted), self.workers)
@@ -325,7 +320,7 @@ class Builder:
             yield place, found.pop(place)
 
     def _own(self, place: Place, offset: Offset) -> bool:
-        """Whether a place's block is not found in a mirror."""
+        """True if a place's block is not found in a mirror."""
         (up, left), (dy, dx) = self._folds(place), offset
         return not (up and dy < 0) and not (left and dx < self.optics.cells.mirrored(dy, dx))
 
@@ -350,7 +345,7 @@ class Builder:
     def images(
         self, states: Iterable[State], reach: tuple[int, int], *, folded: bool = False
     ) -> dict[State, Apart | Few]:
-        """Of points of `reach` cells to all sides, with the lenslets of each state; folded, of some sides."""
+        """Images of points of `reach` cells to all sides, or some if folded, with each state's lenslets."""
         states = list(states)
         if self.apart is not None:
             folds = self.even if folded else (False, False)
@@ -381,7 +376,7 @@ class Builder:
         return range(0 if folded else -reach, reach + 1)
 
     def folded(self, axis: int, limits: Limits) -> bool:
-        """Whether what is on one side mirrors what is on the other."""
+        """True if one side mirrors the other."""
         return self.even[axis] and flipped(limits) == limits
 
     def _folds(self, place: Place) -> tuple[bool, bool]:

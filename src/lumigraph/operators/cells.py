@@ -103,7 +103,7 @@ class Cells:
         return range(2 if self.staggered else 1)
 
     def shift(self, dy: int) -> int:
-        """Half cells from an even row to cell (dy, 0), as offsets from even rows are counted."""
+        """Half cells by which cell (dy, 0) is shifted from an even row, as offsets are counted."""
         return dy % 2 if self.staggered else 0
 
     def mirrored(self, dy: int, dx: int) -> int:
@@ -148,7 +148,7 @@ def telecentric_distance(camera: CameraOptics) -> float:
 
 
 def accepted(camera: CameraOptics) -> Accepted | None:
-    """How its pixels respond to angles behind its lenslets; None where they do alike to all."""
+    """Angular response of the pixels behind lenslets, with their distance; None for a flat one."""
     response = camera.sensor.angular_response
     return None if response is None or response.is_flat else (response, lenslet_distance(camera))
 
@@ -265,7 +265,7 @@ def _sampled(camera: CameraOptics, fineness: Fineness, cells: Cells, distance: f
 
 
 def _seen(camera: CameraOptics) -> tuple[float, float]:
-    """How far the sensor sees along y and x of the straight array, on the telecentric image [m]."""
+    """Half size (y, x) of what the sensor sees of the straight array, on the telecentric image [m]."""
     scale, rotation = (
         1 + lenslet_distance(camera) / camera.separation,
         camera.lattice.rotation if camera.lattice else 0.0,
@@ -286,7 +286,7 @@ def diffraction(camera: CameraOptics) -> float:
 
 
 def spill(camera: CameraOptics) -> float:
-    """How far a micro-image reaches over its lenslet's edge [m]: 0 but where the main lens is wide."""
+    """Overlap of a micro-image with its lenslet's neighbours [m]: 0 unless the main lens is wide."""
     assert camera.lattice is not None  # asked by `lenslet_array`
     width = camera.pupil_diameter * lenslet_distance(camera) / camera.separation
     return max(0.0, width - 1.25 * camera.lattice.pitch) / 2
@@ -304,7 +304,7 @@ def airy(camera: CameraOptics) -> float:
 
 
 def edges(array: LensletArray) -> Edges:
-    """Of an array's lenslets."""
+    """Kind of edges of an array's lenslets: "meet", "straight" or "other"."""
     if array.shape == "round":
         return "other"
     return "meet" if array.fill_factor == 1 else "straight" if array.lattice.layout == "square" else "other"
@@ -339,7 +339,7 @@ def _turned(element: Element, angle: float) -> Element:
 
 
 def mirrored(camera: CameraOptics) -> bool:
-    """Whether the main lens is known to be the same in a mirror along each axis of the straight array."""
+    """True if the main lens is known to be the same in a mirror along each axis of the straight array."""
     return all(
         isinstance(element, ThinLens | CircularAperture)
         or (isinstance(element, ZernikePlate) and _upright(element))
@@ -372,7 +372,7 @@ def stop_reach(lens: Train) -> float:
 
 
 def stop_area(lens: Train) -> float:
-    """Of a lens' stop, over that of the camera's round one."""
+    """Area of a lens' stop, over that of the camera's round one."""
     return math.prod(p.area for p in lens.elements if isinstance(p, ZernikePlate))
 
 

@@ -52,13 +52,13 @@ class Found:
     basis: np.ndarray | None = None
 
     def cut(self, least: float) -> Factors:
-        """Those stronger than `least`."""
+        """Factors that are stronger than `least`."""
         kept = self.strength > least
         left = self.left[:, kept]
         return left if self.basis is None else self.basis @ left, self.right[kept]
 
     def narrowed(self, precision: type[np.floating]) -> "Found":
-        """With right factors of a precision."""
+        """The same with right factors of a precision."""
         left, right = narrowed(self.left, self.right, precision)
         return replace(self, left=left, right=right)
 
@@ -92,7 +92,7 @@ def factors(block: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np
 def strongest(
     rows: np.ndarray, weights: np.ndarray | None, least: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As `factors`, of ``weights @ rows``, few rows that need no sketch."""
+    """Strongest factors, as `factors`, of ``weights @ rows``, few rows that need no sketch."""
     return _strongest(rows, least, weights)[:3]
 
 

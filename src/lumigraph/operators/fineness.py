@@ -1,4 +1,4 @@
-"""What an accuracy asks of the lenslet-periodic operator: how finely to sample, how far to follow light."""
+"""Sampling and reach that an accuracy of the lenslet-periodic operator needs."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ two lines, and so farthest."""
 
 @dataclass(frozen=True, slots=True)
 class Fineness:
-    """What an accuracy asks for: found on the thesis' cameras against runs with twice as much of each.
+    """Sampling and reach for an accuracy, found on the thesis' cameras against runs with twice as much.
 
     Parameters
     ----------
@@ -100,15 +100,15 @@ class Fineness:
 
     @property
     def ring(self) -> float:
-        """How far beyond the array's micro-images light is followed [pitches]."""
+        """Distance beyond the array's micro-images to which light is followed [pitches]."""
         return 1.9 * (1e-3 / self.accuracy) ** 0.3
 
     def near(self, blur: float, airy: float) -> float:
-        """As `reach`, for what the lenslets that are missing beyond the border take away."""
+        """Distance, as `reach`, for the light that the lenslets missing beyond the border take away."""
         return blur + 8 * airy * (1e-3 / self.accuracy) ** 0.4
 
     def reach(self, blur: float, airy: float) -> float:
-        """How far from its geometric image a point's light is followed in full.
+        """Distance from its geometric image to which a point's light is followed in full.
 
         Parameters
         ----------
@@ -126,5 +126,5 @@ def _farther(blur: float) -> float:
 
 
 def tail(fresnel_number: float) -> float:
-    """How far a lenslet's edges send light aside, over those that the constants were found on."""
+    """Light that a lenslet's edges send aside, over that of the lenslets that the constants were found on."""
     return min(1.0, math.sqrt(3 / fresnel_number))

@@ -1,9 +1,9 @@
-r"""How images of points by a Fourier microscope change with the microscope, whatever of it changes.
+r"""Derivatives of images of points before a Fourier microscope, by any part of the microscope.
 
-Behind a lenslet the field is U = D P Dᵀ: P the wave on the lenslet, D the way from there to the pixels. How a
-number that is made of the images and of their derivatives by place changes with P follows from one run
-backwards, about as long as one forwards. P itself is cheap: how it changes with a focal length, a place or a
-mask is the difference of two microscopes a little apart.
+Behind a lenslet the field is U = D P Dᵀ: P the wave on the lenslet, D the way from there to the pixels. The
+derivative by P of a number made of the images and of their derivatives by place follows from one run
+backwards, about as long as one forwards. P itself is cheap: its change with a focal length, a place or a mask
+is the difference of two microscopes a little apart.
 """
 
 import math
@@ -25,7 +25,7 @@ OF_EACH = ("centers", "focal_lengths")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pupil:
-    """What a lenslet's images of points follow from.
+    """Pupil of a lenslet, from which its images of points follow.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Pupil:
     def of(
         cls, seen: tuple[Objective, Mosaic, int], depths: np.ndarray, share: float, like: Self | int
     ) -> Self:
-        """Behind a lenslet at a wavelength, by a share of the light; sampled like another or for a window."""
+        """Pupil of a lenslet at a wavelength, by a share of the light; sampled like another or by window."""
         objective, mosaic, j = seen
         made_of = (
             objective, *mosaic.centers[j].tolist(), float(mosaic.focal_lengths[j]), share,
@@ -92,7 +92,7 @@ def pupils(
     share: float = 1.0,
     like: list[Pupil] | None = None,
 ) -> list[Pupil]:
-    """Of each wavelength and lenslet.
+    """Pupils of each wavelength and lenslet.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def pupils(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slopes:
-    """What a number changes by as a pupil does: by its waves (conjugate, halved), and by the rest of it."""
+    """Derivatives of a number by a pupil: by its waves (conjugate, halved), and by the rest of it."""
 
     waves: np.ndarray
     deeper: np.ndarray
@@ -138,7 +138,7 @@ class Slopes:
 
     @classmethod
     def none(cls, pupil: Pupil) -> Self:
-        """Of a number that does not change."""
+        """Slopes of a number that does not change."""
         return cls(np.zeros_like(pupil.waves), np.zeros_like(pupil.deeper), 0.0, np.zeros(2), 0.0)
 
 
@@ -172,7 +172,7 @@ class Behind:
 
     @classmethod
     def of(cls, pupil: Pupil, k: int, across: np.ndarray, nearest: np.ndarray | None = None) -> Self:
-        """Of a point's (y, x) [m], around the nearest pixel or around one given."""
+        """Light of a point at (y, x) [m], around the nearest pixel or around one given."""
         at = pupil.at + pupil.per_metre * across
         nearest = np.round(at).astype(int) if nearest is None else nearest
         s, turn = pupil.across, pupil.turn

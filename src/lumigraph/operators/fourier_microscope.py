@@ -2,13 +2,8 @@ r"""Raw image of a volume by a Fourier light-field microscope, and the adjoint.
 
 Each lenslet stands in the image of the pupil and images the whole field by its share of the light. Moving a
 point moves its image behind every lenslet by the same amount, so that each depth is a plain convolution for
-each lenslet:
-
-.. math:: h_j(x) = \left| \int_{lenslet\ j} A(q)\, e^{i k \sqrt{n^2 - q^2}\, dz}
-          e^{i k (1/b - 1/f_j) |u - P_j|^2 / 2}
-          e^{-2\pi i (u - P_j) x / (\lambda b)}\, du \right|^2, \qquad q = u M / f_F
-
-A lenslet that is weaker than 1/b focuses points at a depth n (1/b - 1/f_j) (f_F/M)², farther away.
+each lenslet, with the image of a point on the axis (docs/theory/microscope.md). A lenslet that is weaker than
+1/b focuses points at a depth n (1/b - 1/f_j) (f_F/M)², farther away.
 
 C. Guo et al., "Fourier light-field microscopy", Opt. Express 27, 25573 (2019).
 """
@@ -72,17 +67,17 @@ class Mosaic:
     pitch: float
 
     def of(self, lenslets: np.ndarray) -> "Mosaic":
-        """With some of the lenslets (k,)."""
+        """The mosaic with some of the lenslets (k,)."""
         return replace(self, centers=self.centers[lenslets], focal_lengths=self.focal_lengths[lenslets])
 
     @property
     def total_magnification(self) -> float:
-        """From the object to the sensor, M b/f_F."""
+        """Magnification from the object to the sensor, M b/f_F."""
         return self.magnification * self.distance / self.fourier_lens
 
     @property
     def defocus(self) -> np.ndarray:
-        """Of each lenslet, 1/b - 1/f_j [1/m]."""
+        """Defocus of each lenslet, 1/b - 1/f_j [1/m]."""
         return 1 / self.distance - 1 / self.focal_lengths
 
     @property
@@ -120,13 +115,13 @@ class FourierMicroscopeOperator(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of the points' images and their spectra [bytes]."""
+        """Memory of the points' images and their spectra [bytes]."""
         ny, nx = self._size
         return self.images.nbytes + 8.0 * math.prod(self.images.shape[:2]) * ny * (nx // 2 + 1)
 
     @property
     def error(self) -> float:
-        """Not known: NaN."""
+        """Relative error: unknown, NaN."""
         return math.nan
 
     def _forward(self, intensity: Array) -> Array:
@@ -165,7 +160,7 @@ class FourierMicroscopeOperator(Linear):
 
     @property
     def _size(self) -> tuple[int, int]:
-        """Of the convolutions: field and image together, rounded up to a smooth number."""
+        """Size (y, x) of the convolutions: field and image together, rounded up to a smooth number."""
         w = self.images.shape[-1]
         ny, nx = (scipy.fft.next_fast_len(n + w - 1) or n + w - 1 for n in self.plane)
         return ny, nx
@@ -178,7 +173,7 @@ class FourierMicroscopeOperator(Linear):
         return self._spectra[key]
 
     def _windows(self) -> list[tuple[Window, Window]]:
-        """For each lenslet the pixels of the raw image, and which of its convolution fall on them."""
+        """Windows of each lenslet: the pixels of the raw image, and the part of its convolution on them."""
         w = self.images.shape[-1]
         size = self.plane[0] + w - 1, self.plane[1] + w - 1
         return [overlap(corner, size, self.raw_shape) for corner in self.corners.tolist()]
@@ -241,12 +236,12 @@ def fourier_operator(
 
 
 def lit_lenslets(objective: Objective, mosaic: Mosaic) -> Mosaic:
-    """Those lenslets that the pupil lights at least in part."""
+    """The lenslets that the pupil lights at least in part."""
     return mosaic.of(lit_ones(objective, mosaic))
 
 
 def lit_ones(objective: Objective, mosaic: Mosaic) -> np.ndarray:
-    """Which lenslets the pupil lights at least in part, (k,)."""
+    """Mask (k,) of lenslets that the pupil lights at least in part."""
     radius = mosaic.fourier_lens * objective.aperture / mosaic.magnification
     nearest = np.maximum(np.abs(mosaic.centers) - mosaic.width / 2, 0)
     lit = np.hypot(*nearest.T) < radius
@@ -304,7 +299,7 @@ class View:
         half: int,
         fine: Fine | None = None,
     ) -> "View":
-        """That of the lenslet of a number, by as many samples and nodes as are needed, or as are given."""
+        """View of the lenslet of a number, by as many samples and nodes as are needed, or as are given."""
         wave, f, width = objective.wavelength, mosaic.distance, mosaic.width
         center, bend = mosaic.centers[lenslet], np.pi * mosaic.defocus[lenslet] / wave
         per_pixel = 2.2 * mosaic.pixel_pitch * width / (wave * f)
@@ -323,13 +318,13 @@ class View:
         return cls(u, (qy * within, qx * within), amplitude, turn, half, over, scale)
 
     def waves(self, middle: float) -> np.ndarray:
-        """From the samples to the nodes of the pixels (pixels · over, n) around a place near a pixel [px]."""
+        """Waves (pixels · over, n) from the samples to the nodes of pixels around a place [px]."""
         nodes = legendre(self.over)[0] / 2
         fine = np.arange(-self.half, self.half + 1)[:, None] + nodes
         return np.exp(-1j * self.turn * np.outer(fine.ravel() - middle, self.u))
 
     def pixels(self, light: np.ndarray) -> np.ndarray:
-        """Of intensities on the pixels' nodes."""
+        """Pixels of intensities on their nodes."""
         count, weights = 2 * self.half + 1, legendre(self.over)[1]
         parts = light.reshape(count, self.over, count, self.over)
         return np.einsum("yixj,i,j->yx", parts, weights, weights, optimize=True) * self.scale

@@ -1,4 +1,4 @@
-r"""Raw images of a plane before a Fourier microscope, and how they change with whatever changes of it.
+r"""Raw images of a plane before a Fourier microscope, and their derivatives by its parts.
 
 Behind each lenslet the image is one convolution with that of a point on the axis, which follows from a pupil
 (`fourier_changes`),
@@ -31,7 +31,7 @@ Both = tuple[FourierPoints, FourierPoints]
 
 @dataclass(frozen=True, eq=False)
 class FourierPlane(WholePlane):
-    """How a Fourier microscope sees a plane, with derivatives by what differs between pairs of microscopes.
+    """Images of a plane before a Fourier microscope, with derivatives by differences of pairs of microscopes.
 
     The object's samples stay where they are; an even object of 1 is 1 behind a whole lenslet on the axis, of
     all microscopes. What stands beyond the field of a lenslet is left out.
@@ -69,7 +69,7 @@ class FourierPlane(WholePlane):
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Of a raw image and of an object."""
+        """Shapes of a raw image and of an object."""
         return self.points.mosaic.shape, self.grid.shape
 
     @property
@@ -113,7 +113,7 @@ class FourierPlane(WholePlane):
         return found
 
     def _spread(self, end: FourierPoints) -> Linear:
-        """Onto points that stand as the pixels do."""
+        """Resampling onto points that stand as the pixels do."""
         pitch = end.mosaic.pixel_pitch / end.mosaic.total_magnification
         return represented(self.grid, Grid(self._field, (pitch, pitch)), upright=True)
 
@@ -145,7 +145,7 @@ class FourierPlane(WholePlane):
         return self._with(images)
 
     def _with(self, images: np.ndarray) -> FourierMicroscopeOperator:
-        """With images (1, lenslets, w, w) of a point on the axis."""
+        """Operator with images (1, lenslets, w, w) of a point on the axis."""
         nearest = np.array([one.nearest for one in self._behind[: self._lenslets]])
         corners = nearest + np.array(self.shape[0]) // 2 - images.shape[-1] // 2 - self._field[0] // 2
         return FourierMicroscopeOperator(images, corners, self.shape[0], self._field)
@@ -155,7 +155,7 @@ class FourierPlane(WholePlane):
         return len(self._behind) // len(self.points.objectives)
 
     def _window(self, images: np.ndarray, number: int) -> np.ndarray:
-        """Of a lenslet, as wide as its wavelength's image."""
+        """Window of a lenslet, as wide as its wavelength's image."""
         half, most = self._behind[number].pupil.half, images.shape[-1] // 2
         inside = slice(most - half, most + half + 1)
         return images[0, number % self._lenslets, inside, inside]

@@ -62,7 +62,7 @@ class FourierPoints:
         return found
 
     def _seen(self, position: tuple[float, float, float], count: int, behind: Behind) -> np.ndarray:
-        """What all lenslets show (count, ny, nx), of what is found behind each."""
+        """Raw image of all lenslets (count, ny, nx), by what is found behind each."""
         found, mosaic = np.zeros((count, *self.mosaic.shape)), self.mosaic
         moved = mosaic.total_magnification * np.array(position[:2])
         for objective in self.objectives:

@@ -84,7 +84,7 @@ class Glare:
         return within
 
     def widened(self, more: Offset) -> "Glare":
-        """Of so many more cells of the object on each side."""
+        """The same for so many more cells of the object on each side."""
         reach = self.margin[0], self.margin[1] - self.cells.staggered
         margin = self.margin[0] + more[0], self.margin[1] + more[1]
         return replace(self, spectra=_spectra(self.cells, reach, margin), margin=margin)
@@ -150,12 +150,12 @@ class Glare:
 
 
 def _places(cells: Cells, shape: Offset) -> Offset:
-    """Of so many cells: half a cell apart along x where they are staggered."""
+    """Number of places of so many cells: half a cell apart along x where they are staggered."""
     return (shape[0], 2 * shape[1] + 1) if cells.staggered else shape
 
 
 def glare(means: Sequence[Means], cells: Cells, even: np.ndarray | None = None) -> Glare:
-    """Beyond the offsets of `means`.
+    """Glare of cells beyond the offsets of `means`.
 
     At the end of the reach light may not fall as the cube yet. So what all pictures add up to is made right
     for an endless even object, in all directions alike.
@@ -193,7 +193,7 @@ def _ring(cells: Cells, reach: Offset) -> list[Offset]:
 
 
 def _totals(cells: Cells, reach: Offset) -> np.ndarray:
-    """How much of each picture (q,) all cells together give that are out of reach, for ever."""
+    """Amount of each picture (q,) that all cells out of reach, to infinity, give together."""
     near, far = (
         np.bincount(which, law, len(_ring(cells, reach)))
         for which, _, _, law in (_law(cells, reach, (n, n)) for n in (8 * max(reach), 16 * max(reach)))
@@ -209,7 +209,7 @@ def _shares(cells: Cells, reach: Offset) -> np.ndarray:
 
 
 def aside(cells: Cells, margin: Offset, share: float, farther: float) -> Glare:
-    """What lenslets send far aside, evenly: a share of each one's light, to `farther` [m] and beyond.
+    """Even light that lenslets send far aside: a share of each one's light, to `farther` [m] and beyond.
 
     Opaque rims do; it falls as the cube too, and comes from where there are lenslets only.
     """
@@ -238,7 +238,7 @@ def _offsets(cells: Cells, farthest: Offset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _law(cells: Cells, reach: Offset, farthest: Offset) -> tuple[np.ndarray, ...]:
-    """Which picture, rows, places along x and how much, of offsets out of reach, less than `farthest`."""
+    """Picture number, rows, places along x and amount of offsets out of reach, less than `farthest`."""
     staggered = int(cells.staggered)
     dy, across = _offsets(cells, farthest)
     out = np.maximum(np.abs(dy) / reach[0], np.abs(across) / (reach[1] + staggered / 2))

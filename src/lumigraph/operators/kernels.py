@@ -28,7 +28,7 @@ from lumigraph.operators.white import endless
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Matrix:
-    """From the points of an object's cells to the samples of an image's.
+    """Matrix from the points of an object's cells to the samples of an image's.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ A_MINUTE = 6e12
 
 
 def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None = None) -> Matrix | Streamed:
-    """Of one depth: from memory, from disk, or built; streamed where building takes more than `HELD`.
+    """Matrix of one depth: from memory, from disk, or built; streamed if building takes more than `HELD`.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def matrix(optics: Optics, progress: Progress | None = None, folder: Path | None
 
 
 def operations(optics: Optics) -> float:
-    """Of building it or, where it is streamed, of each image."""
+    """Multiply-adds of building it or, where it is streamed, of each image."""
     return build_operations(optics) if _held(optics) or not optics.straight else stream_operations(optics)
 
 
@@ -116,7 +116,7 @@ def said(operations: float, what: str) -> None:
 
 
 def _held(optics: Optics) -> bool:
-    """Whether it is kept, whatever memory is free: streamed images differ, and should not tell the machine.
+    """True if it is kept. Independent of the free memory: streamed images differ by rounding.
 
     What cannot be streamed is held where it fits at all.
     """
@@ -131,7 +131,7 @@ def _needed(optics: Optics) -> float:
 
 
 def _can(optics: Optics) -> bool:
-    """Whether it fits in memory and is fast enough; only lenslets whose axes are apart are streamed."""
+    """True if it fits in memory and is fast enough; only lenslets whose axes are apart are streamed."""
     fast = _held(optics) or (optics.straight and stream_operations(optics) <= LONGEST)
     return fast and _needed(optics) <= (memory.available() or math.inf)
 
@@ -155,7 +155,7 @@ def _require(optics: Optics) -> None:
 
 
 def _price(fits: Optics) -> str:
-    """What an operator that can be had takes."""
+    """Cost of the finest operator that fits, in words."""
     needed = _needed(fits)
     minutes, each = operations(fits) / A_MINUTE, "" if _held(fits) else " for each image"
     time = f", some {minutes:.2g} min of a processor{each}" if minutes > 1 else ""

@@ -72,7 +72,7 @@ def refined(fine: int, points: int, accuracy: float, seen: Callable[[int], np.nd
 
 
 def bench_bytes(modes: int, cells: int, fine: int, points: int) -> float:
-    """Of what images of points on so many lines hold at most on a `Bench`'s grid, in all threads."""
+    """Memory of images of points on so many lines at most on a `Bench`'s grid, in all threads [bytes]."""
     field, threads = 16.0 * modes + 64, min(arrays.WORKERS, points)
     # Points share one field if it moves by whole samples, and each thread holds its light.
     of_each = threads * field if fine % points else max(field, 8.0 * modes + 8 + 32 * threads)
@@ -93,13 +93,13 @@ def require_finer(needed: float, fine: int, dz: float) -> None:
 
 
 def shared_length(least: int, points: int) -> int:
-    """At least so many samples, quick to transform; a multiple of `points` where that takes few more."""
+    """Number of samples, at least `least`, quick to transform; a multiple of `points` if few more."""
     shared = fast_length(math.ceil(least / points)) * points
     return shared if points > 1 and shared <= MORE * least else fast_length(least)
 
 
 def fast_length(least: int) -> int:
-    """At least so many samples, of a number that is quick to transform."""
+    """Number of samples, at least `least`, that is quick to transform."""
     return int(scipy.fft.next_fast_len(least) or least)
 
 
@@ -122,7 +122,7 @@ def spline_response(f: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]
 
 @remembered
 def transmission(lenslet: Lenslet, wavelength: float, finest: int, samples: int) -> np.ndarray:
-    """Of a lenslet (samples, samples), of its Fourier series up to `finest` periods in a pitch."""
+    """Transmission of a lenslet (samples, samples), by its Fourier series up to `finest` per pitch."""
     waves = _waves(finest, samples)
     if lenslet.is_round:
         return waves @ round_series(lenslet, wavelength, finest) @ waves.T
@@ -161,7 +161,7 @@ def _lines(lenslet: Lenslet, wavelength: float, finest: int, halves: Sequence[fl
 
 
 def _turns(lenslet: Lenslet, wavelength: float, finest: int) -> float:
-    """Of the phase that a lenslet's series is made of, over its width."""
+    """Turns of the phase that a lenslet's series is made of, over its width."""
     return finest + lenslet.pitch**2 / (wavelength * abs(lenslet.focal_length))
 
 
@@ -208,7 +208,7 @@ class Bench:
         self.transfer = np.exp(path * np.fft.fftfreq(n, step) ** 2).astype(np.complex64)
 
     def _lenslets(self) -> np.ndarray:
-        """What the lenslets do to the field on the grid, as finely as neither is aliased.
+        """Transmission of the lenslets on the grid, as finely as neither they nor the field are aliased.
 
         Light that a lenslet's border sends steeper than that goes far, and makes fringes that are finer than
         pixels with what is brighter: it is better left out than where it does not belong.
@@ -235,7 +235,7 @@ class Bench:
         return each(image, points)
 
     def _middle(self, fine: int, dz: float, point: tuple[float, float]) -> np.ndarray:
-        """Of a point's image, on some grid."""
+        """Middle of a point's image, on some grid."""
         part = copy(self)
         part._lay(fine, min(self.reach, MIDDLE))
         return part.image(part.fields(dz)(point))[0]
@@ -260,7 +260,7 @@ class Bench:
         return image * np.float32(area), lost
 
     def fields(self, dz: float) -> Callable[[tuple[float, float]], np.ndarray]:
-        """Gives the field (modes, n, n) before the lenslets of a point (ky, kx) at a depth [samples]."""
+        """Function that returns the field (modes, n, n) before the lenslets of a point (ky, kx) [samples]."""
         s, pitch = self.sampling.points, self.lenslet.pitch / self.lenslet.magnification
         at, step = self.at / self.lenslet.magnification, self.fine // s
 
@@ -289,7 +289,7 @@ class Bench:
         return each(lambda point: self.intensity(fields(point)), points)
 
     def intensity(self, field: np.ndarray) -> np.ndarray:
-        """On the whole fine grid behind the lenslets, from the field (modes, n, n) of a point before them."""
+        """Intensity on the whole fine grid behind the lenslets, by the field (modes, n, n) before them."""
         image = np.zeros((len(self.at),) * 2, np.float32)
         for mode in field:
             behind = mode * self.lenslets

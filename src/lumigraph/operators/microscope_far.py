@@ -18,7 +18,7 @@ from lumigraph.core.arrays import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Far:
-    """What far cells receive of one depth.
+    """Light that far cells receive from one depth.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class FarLight:
     def of(
         cls, fars: list[Far], cells: tuple[int, int], margin: int, basis: np.ndarray | None, like: Array
     ) -> "FarLight":
-        """From the depths' own, of objects that reach `margin` lenslets beyond those of the image.
+        """Far light by the depths' own, of objects that reach `margin` lenslets beyond those of the image.
 
         `basis` (N², r) are the patterns of a cell's image; None for its samples themselves.
         """
@@ -138,7 +138,7 @@ class FarLight:
         return arrays.namespace(self.images).reshape(self.images, (-1, self.images.shape[-1]))
 
     def adjoint(self, light: Array) -> Array:
-        """What each point of a cell (z, rows, columns) sees of light (rows, columns, r)."""
+        """Light (z, rows, columns) that each point of a cell receives back from light (rows, columns, r)."""
         xp, (rows, columns) = arrays.namespace(light), self.cells
         flat = xp.reshape(light, (-1, light.shape[-1]))
         parts = xp.reshape(
@@ -153,7 +153,7 @@ class FarLight:
 
 
 def far_numbers(fars: Sequence[Far], cells: tuple[int, int], margin: int, patterns: int) -> int:
-    """How many a `FarLight` of shared patterns holds, with what `forward` or `adjoint` takes."""
+    """Numbers that a `FarLight` of shared patterns holds, with what `forward` or `adjoint` takes."""
     (y, x), k = _lengths(cells, margin), len(fars[0].images)
     spectrum = 2 * y * (x // 2 + 1)
     return spectrum * (len(fars) * (k + 1) + 3 * k) + k * patterns
@@ -165,7 +165,7 @@ def _seen(cells: tuple[int, int], margin: int) -> tuple[int, int]:
 
 
 def _lengths(cells: tuple[int, int], margin: int) -> tuple[int, int]:
-    """Of the transforms (y, x), in which no light falls round their ends."""
+    """Lengths of the transforms (y, x), in which no light falls round their ends."""
     y, x = (n + m - 1 for n, m in zip(cells, _seen(cells, margin), strict=True))
     return int(scipy.fft.next_fast_len(y, real=True) or y), int(scipy.fft.next_fast_len(x, real=True) or x)
 

@@ -61,7 +61,7 @@ RAYS = 0.95
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """How exactly images are wanted.
+    """Accuracy and extent of the wanted images.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ class SliceKernel:
         return whole.reshape(n * s * s, N * N)
 
     def _moved(self, flip_y: bool, flip_x: bool, swap: bool) -> np.ndarray:
-        """Where each offset stands after a transposition and flips."""
+        """Place of each offset after a transposition and flips."""
         dy, dx = (self.offsets[:, ::-1] if swap else self.offsets).T
         dy, dx = (-dy if flip_y else dy), (-dx if flip_x else dx)
         reach = int(np.abs(self.offsets).max())
@@ -161,7 +161,7 @@ def octant(s: int) -> list[tuple[int, int]]:
 
 @lru_cache(maxsize=16)
 def _expansion(s: int) -> list[tuple[int, tuple[bool, bool, bool], int]]:
-    """For each point of a cell: place, (flip y, flip x, transpose first), stored point."""
+    """Origin of each point of a cell: place, (flip y, flip x, transpose first), stored point."""
     rows = {point: row for row, point in enumerate(octant(s))}
     found = []
     for ky in range(s):
@@ -212,7 +212,7 @@ def _lit(objective: Objective, lenslet: Lenslet, dz: float) -> float:
 
 
 def _ray_radius(objective: Objective, dz: float, part: float = RAYS) -> float:
-    """Of what rays light, this part of those that aberrations bend, in object space [m]."""
+    """Radius of what rays light, for this part of those that aberrations bend, in object space [m]."""
     spread = objective.aperture / math.sqrt(objective.medium**2 - objective.aperture**2)
     straight = abs(dz) * spread + abs(objective.image_defocus) * objective.numerical_aperture
     return straight + objective.spread(part)
@@ -276,7 +276,7 @@ def _symmetrised(average: np.ndarray, T: int) -> np.ndarray:
 
 
 def _sectors(offsets: np.ndarray) -> np.ndarray:
-    """What part (n, SECTORS) of each offset belongs to each direction: linear between two."""
+    """Part (n, SECTORS) of each offset that belongs to each direction: linear between two."""
     at = np.arctan2(offsets[:, 0], offsets[:, 1]) * SECTORS / (2 * np.pi)
     first, rows = np.floor(at).astype(int), np.arange(len(at))
     found = np.zeros((len(at), SECTORS), np.float32)

@@ -17,7 +17,7 @@ PIXELS = 0.6
 
 
 class Behind(NamedTuple):
-    """What stands behind the lenslets: where micro-images stand, and the pixels' fill factor."""
+    """Sensor behind the lenslets: places of the micro-images, and the pixels' fill factor."""
 
     calibration: Calibration
     fill: float
@@ -27,8 +27,8 @@ def cell_sampling(
     objective: Objective, lenslet: Lenslet, behind: Behind, points: int, depths: tuple[float, ...],
     accuracy: float,
 ) -> CellSampling:  # fmt: skip
-    """Of so many points of the object along a lenslet, and of the pixels: those, or samples between which
-    they are interpolated.
+    """Sampling of a cell: so many points of the object along a lenslet, and its pixels, or samples
+    between which they are interpolated.
     """
     calibration, fill = behind
     if N := whole_pixels(calibration, accuracy):
@@ -40,7 +40,7 @@ def interpolated(
     objective: Objective, lenslet: Lenslet, behind: Behind, points: int, depths: tuple[float, ...],
     accuracy: float, samples: int | None = None,
 ) -> CellSampling:  # fmt: skip
-    """Of pixels wherever they stand: with so many samples along a lenslet, or as many as are needed."""
+    """Sampling of pixels wherever they stand: so many samples along a lenslet, or as many as are needed."""
     width = behind.fill / behind.calibration.lattice.pitch
     N = samples or samples_needed(objective, lenslet, width, depths, PIXELS * accuracy)
     return CellSampling(points, N, width, DEGREE, behind.fill**2)

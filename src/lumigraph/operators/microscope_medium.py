@@ -43,7 +43,7 @@ class Through:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """How points are seen through a medium: what those of one depth have in common is found once.
+    """Images of points through a medium: the common part of one depth is computed once.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Seen:
     _lights: dict[tuple[Objective, int, float], Multislice] = field(default_factory=dict)
 
     def image(self, position: np.ndarray) -> Through:
-        """Of a point at (y, x, dz) [m], through the slices before it.
+        """Image of a point at (y, x, dz) [m], through the slices before it.
 
         Raises
         ------
@@ -86,7 +86,7 @@ class Seen:
         return _apart(fine, finer)
 
     def seconds(self, depths: np.ndarray) -> float:
-        """That points at some depths [m] take at least, as transforms take on this machine.
+        """Least time that points at some depths [m] take, as transforms take on this machine [s].
 
         Raises
         ------
@@ -119,7 +119,7 @@ class Seen:
         return image, float(np.mean(shares))
 
     def _away(self, met: Medium | None, position: np.ndarray) -> float:
-        """How far from focus a point would be whose light spreads as far as slices spread this one's [m]."""
+        """Distance from focus of a point whose light spreads as far as slices spread this one's [m]."""
         dz = float(position[2])
         if met is None:
             return dz
@@ -131,7 +131,7 @@ class Seen:
         return math.copysign(abs(dz) + farthest, dz)
 
     def _light(self, objective: Objective, met: Medium, dz: float) -> Multislice:
-        """Of points at a depth; `met` is remembered by the medium, which is kept here."""
+        """Light of points at a depth; `met` is remembered by the medium, which is kept here."""
         key = objective, id(met), dz
         if key not in self._lights:
             if len(self._lights) >= KEPT:

@@ -95,7 +95,7 @@ class MicroscopeOperator(Linear):
 
     @property
     def multiply_adds(self) -> int:
-        """Of the matrix products of one application of `forward` or `adjoint`."""
+        """Multiply-adds of the matrix products in one application of `forward` or `adjoint`."""
         if self.by_frequency:
             return 4 * self._tiling.count * self._matrix_numbers
         rows = sum(len(kernel.offsets) * kernel.sampling.classes for kernel in self.kernels)
@@ -103,12 +103,12 @@ class MicroscopeOperator(Linear):
 
     @property
     def nbytes(self) -> int:
-        """Of the stored kernels."""
+        """Memory of the stored kernels [bytes]."""
         return sum(kernel.blocks.nbytes for kernel in self.kernels)
 
     @property
     def memory_bytes(self) -> float:
-        """Of the kernels, of the matrices, and of what `forward` or `adjoint` holds [bytes]."""
+        """Memory of the kernels, of the matrices, and of what `forward` or `adjoint` holds [bytes]."""
         N, given = self.kernels[0].sampling.pixels, sum(math.prod(shape) for shape in self.shape)
         if self.by_frequency:
             held = microscope_spectrum.held_numbers(self._tiling, self._points, self._pixels)
@@ -184,7 +184,7 @@ class MicroscopeOperator(Linear):
 
     @property
     def _far_numbers(self) -> int:
-        """Of far light, and of what it holds while it is followed."""
+        """Numbers of far light, and of what it holds while it is followed."""
         fars = self._shared[0]
         return far_numbers(fars, self.cells, self.margin, self._pixels.count) if fars else 0
 
@@ -220,7 +220,7 @@ class MicroscopeOperator(Linear):
 
     @property
     def _own_fars(self) -> list[Far]:
-        """Of each depth; none where one has none."""
+        """Far light of each depth; empty where one has none."""
         fars = [kernel.far for kernel in self.kernels if kernel.far is not None]
         return fars if len(fars) == len(self.kernels) else []
 
@@ -312,7 +312,7 @@ class MicroscopeOperator(Linear):
 
 
 def _norms(kernel: SliceKernel) -> tuple[float, float]:
-    """Of the image of the point that has least, in cells that are not far, and of an even plane's."""
+    """Norms of the image of the faintest point, in cells that are not far, and of an even plane's."""
     return math.sqrt(min(float(np.vdot(one, one)) for one in kernel.blocks)), float(
         np.linalg.norm(kernel.white())
     )
@@ -321,7 +321,7 @@ def _norms(kernel: SliceKernel) -> tuple[float, float]:
 def suits_frequencies(
     kernels: Sequence[SliceKernel], cells: tuple[int, int], margin: int, left_out: float = 0.0
 ) -> bool:
-    """Whether the way through the lenslets' frequencies is faster, and its matrices take no more than `MOST`.
+    """True if the lenslets' frequencies are faster, and their matrices take no more than `MOST`.
 
     Or less than those of all offsets, which then would only be worse. It does not depend on the memory that
     is free: the two ways differ by rounding, and a result's bits should not tell the machine.

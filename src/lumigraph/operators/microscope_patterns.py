@@ -90,7 +90,7 @@ class Patterns:
 
     @property
     def nbytes(self) -> int:
-        """Of the arrays."""
+        """Memory of the arrays [bytes]."""
         return len(self.along) ** 2 * (self.count + 1) * 8
 
     def held(self, like: Array) -> tuple[Array | None, tuple[Array, ...]]:
@@ -114,7 +114,7 @@ class Patterns:
         return self._held[key]
 
     def places(self) -> list[tuple[slice, slice]]:
-        """Where (y, x) the products of each parity stand among (n, n)."""
+        """Places (y, x) of the products of each parity among (n, n)."""
         n, half = len(self.along), (len(self.along) + 1) // 2
         sides = slice(0, half), slice(half, n)
         return [(sides[y], sides[x]) for y, x in PARITIES]
@@ -126,7 +126,7 @@ class Patterns:
 
 @remembered
 def all_patterns(n: int) -> Patterns:
-    """As many patterns as a cell of n × n places has.
+    """All patterns of a cell of n × n places.
 
     >>> all_patterns(3).count, all_patterns(3).of_parity(0, 1).tolist()
     (9, [4, 5])
@@ -137,14 +137,14 @@ def all_patterns(n: int) -> Patterns:
 
 
 def _in_order(n: int) -> np.ndarray:
-    """Of all products (2, n²), their numbers along y and x: parity after parity."""
+    """Numbers along y and x of all products (2, n²): parity after parity."""
     y, x = np.divmod(np.arange(n * n), n)
     half = (n + 1) // 2
     return np.stack([y, x])[:, np.argsort(2 * (y >= half) + (x >= half), kind="stable")]
 
 
 def patterns(kernels: Sequence[SliceKernel], left_out: float) -> list[Patterns]:
-    """Of the points of each depth, so few that no point's image loses more than a relative rms `left_out`.
+    """Patterns of each depth's points, so few that no point's image loses more than an rms `left_out`.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def patterns(kernels: Sequence[SliceKernel], left_out: float) -> list[Patterns]:
 
 
 def pixel_patterns(kernels: Sequence[SliceKernel], left_out: float, points: Sequence[Patterns]) -> Patterns:
-    """Of the image's samples, for all depths.
+    """Patterns of the image's samples, for all depths.
 
     They leave out what they may, `SHARES`, or less where the kernels' own errors and `points` leave less of
     `WHOLE` of what the operator was asked for.
@@ -207,7 +207,7 @@ def few_of_pixels(kernels: Sequence[SliceKernel], left_out: float) -> Patterns:
         return [one / power for one in found]
 
     def shares(kernel: SliceKernel) -> np.ndarray:
-        """Of each point's image (s², N²)."""
+        """Shares of each point's image (s², N²)."""
         parts = _images(kernel, whole, roots)[0]
         own = (np.square(part @ vectors) for part, (_, vectors) in zip(parts, found, strict=True))
         return np.concatenate([_of_all_cells(one, kernel) for one in own], axis=1)

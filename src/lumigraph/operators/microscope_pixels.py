@@ -1,4 +1,4 @@
-"""Where the pixels of a real camera stand among the evenly spaced samples of the lenslets' cells."""
+"""Places of a real camera's pixels among the evenly spaced samples of the lenslets' cells."""
 
 import math
 
@@ -32,7 +32,7 @@ accuracy.
 
 
 def whole_pixels(calibration: Calibration, accuracy: float) -> int | None:
-    """How many pixels each lenslet has along each side, all at the same places; None if they have not.
+    """Number of pixels along each side of a lenslet, all at the same places; None if there is none.
 
     >>> from lumigraph.core.lattice import Lattice
     >>> center = np.array([[30.0, 30.0]])
@@ -58,7 +58,7 @@ def on_lattice(calibration: Calibration) -> np.ndarray:
 def placement(
     calibration: Calibration, pixels: int, degree: int, dtype: type = np.float32
 ) -> tuple[Linear | None, tuple[int, int], np.ndarray]:
-    """From the micro-images of a raw image, with N samples along each side of a cell.
+    """Map from the cells' samples to pixels, by a raw image's micro-images, N samples along a cell's side.
 
     Parameters
     ----------

@@ -1,14 +1,13 @@
 r"""Images of points behind the lenslets of a microscope as functions of its pupil's phase, with derivatives.
 
-Before a lattice of square lenslets a plane wave of the pupil becomes a Bloch wave along each axis,
+Before a lattice of square lenslets a plane wave of the pupil becomes a Bloch wave b along each axis. The
+field on the sensor is one product of small matrices with the pupil, U = B_y P B_x, and so is its change with
+the pupil's phase φ:
 
-.. math:: b(X; q) = \sum_n T_n\, e^{2\pi i (\nu + n/d) X}\, e^{-i \pi \lambda b (\nu + n/d)^2},
-          \quad \nu = q / (\lambda M)
+.. math:: dU = B_y (i \varphi P) B_x, \quad d|U|^2 = 2 \mathrm{Re}(U^* dU)
 
-with T_n a lenslet's Fourier series. The field on the sensor is then one product of small matrices with the
-pupil, U = B_y P B_x, and so is what follows when the pupil's phase changes by φ: dU = B_y (i φ P) B_x, and
-d|U|² = 2 Re(U* dU). Before round lenslets b are plane waves, from which `microscope_round` goes on. Moving a
-point changes the phase as well, so that its place has derivatives too.
+Before round lenslets b are plane waves (`microscope_round`). A point's place changes the phase, too. See
+docs/theory/microscope.md.
 """
 
 import math
@@ -67,7 +66,7 @@ class Lit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PupilImages:
-    r"""How a microscope sees points, for any Zernike terms c_j of its pupil, with derivatives by c_j.
+    r"""Images of points before a microscope, for any Zernike terms c_j of its pupil, with derivatives by c_j.
 
     .. math:: I(c) = \sum_p o_p |U_p(c)|^2, \quad
               \frac{\partial I}{\partial c_j} = \sum_p o_p\, 2 \mathrm{Re}(U_p^* \partial_j U_p)
@@ -110,7 +109,7 @@ class PupilImages:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Of a raw image."""
+        """Shape (ny, nx) of a raw image."""
         if self.layout.placement is not None:
             ny, nx = self.layout.placement.shape[0]
             return ny, nx
@@ -118,7 +117,7 @@ class PupilImages:
 
     @property
     def samples(self) -> tuple[int, int]:
-        """Of the layout, along y and x."""
+        """Samples (y, x) of the layout."""
         N = self.layout.sampling.pixels
         return self.layout.cells[0] * N, self.layout.cells[1] * N
 
@@ -192,7 +191,7 @@ class PupilImages:
         return whole
 
     def cells_at(self, dz: float) -> int:
-        """Along the window that holds the image of a point at a depth [m], without coefficients."""
+        """Number of cells along the window of a point's image at a depth [m], without coefficients."""
         return max(self._size(objective, dz)[0] for objective in self.objectives)
 
     def share(self, dz: float) -> float:
@@ -255,7 +254,7 @@ class PupilImages:
     def _groups(
         self, points: Points, coefficients: np.ndarray
     ) -> Iterator[tuple[Waves, np.ndarray, np.ndarray, list[int]]]:
-        """Of points whose windows are alike: waves, pupil (modes, rows, nodes) as it is known, phases."""
+        """Groups of points whose windows are alike: waves, known pupil (modes, rows, nodes), phases."""
         for objective, bent in zip(self.objectives, self.fixed(coefficients).objectives, strict=True):
             alike: dict[tuple[int, int, int], list[int]] = {}
             for p, (_, _, dz) in enumerate(points.positions):
@@ -278,7 +277,7 @@ class PupilImages:
         return cells, fineness(objective, self.lenslet, margin), 24 * math.ceil(nodes / 24)
 
     def sampled(self, objective: Objective, dz: float) -> tuple[Told, Waves]:
-        """How a window of a point at a depth is sampled, and its waves."""
+        """Sampling of a window of a point at a depth, and its waves."""
         cells, fine, nodes = self._size(objective, dz)
         return (cells, fine, nodes, self._dtype), self._waves(objective, cells, fine, nodes)
 
@@ -332,7 +331,7 @@ class PupilImages:
         return (position[:2] - center) / size + (np.array(self.layout.cells) - 1) / 2
 
     def _window(self, cell: tuple[int, int], count: int) -> list[tuple[slice, slice]]:
-        """Of a window around a cell, along y and x: which of the layout's samples, which of its own."""
+        """Part of a window around a cell, along y and x: the layout's samples, and its own."""
         found, N = [], self.layout.sampling.pixels
         for k, n in zip(cell, self.samples, strict=True):
             first = k * N - (count - N) // 2
@@ -397,7 +396,7 @@ def _nodes(objective: Objective, count: int) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _between(lit: np.ndarray) -> slice:
-    """From the first that is not dark to the last."""
+    """Slice from the first element that is not dark to the last."""
     found = np.flatnonzero(lit)
     return slice(int(found[0]), int(found[-1]) + 1) if len(found) else slice(0, 0)
 

@@ -1,15 +1,12 @@
 r"""Sums of a pupil's plane waves behind a lattice of lenslets, as products of small matrices.
 
 A sum over the nodes of a disc, of amplitudes times Bloch waves b(X; q), is one product along y and one along
-x. The nodes of each row stand elsewhere along x. But b changes with q no faster than light comes from within
-the window, so that b at any q is a sum of those on an even grid nearby: amplitudes are spread onto the grid,
-which all rows share,
+x: amplitudes are spread onto an even grid along x that all rows share,
 
-.. math:: b(X; q) \approx \sum_g w_g(q)\, b(X; q_g), \quad G w = v, \quad G_{gh} = \mathrm{sinc}((g - h) / s),
-          \quad v_g = \mathrm{sinc}((q / \Delta - g) / s)
+.. math:: b(X; q) \approx \sum_g w_g(q)\, b(X; q_g)
 
-with weights of least squares over all waves of half the grid's band (s = 2). Where lenslets are not square
-waves have no axes behind them: b are plane waves before them, whose sum goes on from there.
+with weights of least squares (docs/theory/microscope.md). Where lenslets are not square waves have no axes
+behind them: b are plane waves before them, whose sum goes on from there.
 """
 
 import math
@@ -40,7 +37,7 @@ EDGES = 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Waves:
-    """What the plane waves of a pupil become behind the lenslets of a window, and how it is sampled.
+    """Plane waves of a pupil behind the lenslets of a window, and their sampling.
 
     Parameters
     ----------
@@ -69,7 +66,7 @@ class Waves:
 
     @property
     def nbytes(self) -> int:
-        """Of all arrays."""
+        """Memory of all arrays [bytes]."""
         return (
             self.down.nbytes + self.across.nbytes + self.sampled.nbytes + 3 * self.area.nbytes
             + self.onto.data.nbytes + self.onto.indices.nbytes
@@ -77,12 +74,12 @@ class Waves:
         )  # fmt: skip
 
     def fields(self, pupils: np.ndarray) -> np.ndarray:
-        """On the fine grid (k, n, n), of pupils (k, rows, nodes)."""
+        """Fields on the fine grid (k, n, n), of pupils (k, rows, nodes)."""
         even = of_each(self.onto, pupils, self.across.shape[1])
         return self.behind(self.down.down(self.across.right(even)))
 
     def behind(self, before: np.ndarray) -> np.ndarray:
-        """On the sensor (..., n, n), of what comes before a `window` of lenslets, if there is one."""
+        """Fields on the sensor (..., n, n), from those before a `window` of lenslets, if there is one."""
         return before if self.window is None else self.window.forward(before)
 
     def back(self, fields: np.ndarray) -> np.ndarray:
@@ -94,7 +91,7 @@ class Waves:
         return of_each(self.onto.T, rows, self.area.shape[1]).conj()
 
     def samples(self, light: np.ndarray) -> np.ndarray:
-        """Of intensities (..., n, n) on the fine grid: (..., count, count)."""
+        """Samples (..., count, count) of intensities (..., n, n) on the fine grid."""
         return self.sampled.right(self.sampled.down(light))
 
     def spread(self, samples: np.ndarray) -> np.ndarray:
@@ -117,7 +114,7 @@ Told = tuple[int, int, int, str]
 
 @remembered
 def waves_of(objective: Objective, lenslet: Lenslet, sampling: CellSampling, told: Told) -> Waves:
-    """Of a window."""
+    """Waves of a window."""
     cells, fine, count, dtype = told
     real = "float64" if dtype == "complex128" else "float32"
     qy, qx, area = disc(count, count)
@@ -193,7 +190,7 @@ def _even(objective: Objective, lenslet: Lenslet, told: Told) -> tuple[float, in
 
 
 def _onto(turns: np.ndarray, step: float, count: int) -> csr_array:
-    """What spreads amplitudes of nodes of some turns (rows, nodes) in a pitch onto a grid, row by row."""
+    """Matrix that spreads amplitudes of nodes of some turns (rows, nodes) onto a grid, row by row."""
     near, at = np.arange(NEAR), turns.ravel() / step + count // 2
     first = np.floor(at).astype(int) - NEAR // 2 + 1
     alike = np.sinc((near[:, None] - near) / FINER)

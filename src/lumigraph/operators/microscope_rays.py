@@ -66,7 +66,7 @@ def ray_images(
 
 
 def _weights(objective: Objective, rim: float, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of rays at places from a lenslet's centre: sines along an axis, cosines, light (0 beyond the stop)."""
+    """Sines along an axis, cosines and light (0 beyond the stop) of rays, from a lenslet's centre."""
     sine = at / rim * objective.numerical_aperture / objective.medium
     slant = sine[:, None] ** 2 + sine**2
     inside = slant < (objective.aperture / objective.medium) ** 2
@@ -75,7 +75,7 @@ def _weights(objective: Objective, rim: float, at: np.ndarray) -> tuple[np.ndarr
 
 
 def _rays(sampling: CellSampling, outer: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of each ray along an axis: pixel, cell from the lenslet's own, and place from its centre [cells]."""
+    """Pixel, cell from the lenslet's own, and place from its centre [cells] of each ray along an axis."""
     N = sampling.pixels
     index = np.arange(-outer * N, (outer + 1) * N).repeat(PER_PIXEL)
     within = np.tile((np.arange(PER_PIXEL) + 0.5) / PER_PIXEL - 0.5, (2 * outer + 1) * N)
@@ -83,7 +83,7 @@ def _rays(sampling: CellSampling, outer: int) -> tuple[np.ndarray, np.ndarray, n
 
 
 def _open(lenslet: Lenslet, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Whether light at (y, x) from a lenslet's centre [pitches] falls on its open part."""
+    """Mask of light at (y, x) from a lenslet's centre [pitches] that falls on its open part."""
     half = lenslet.width / lenslet.pitch / 2
     away = np.hypot(y, x) if lenslet.is_round else np.maximum(np.abs(y), np.abs(x))
     return away <= half

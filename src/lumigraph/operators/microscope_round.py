@@ -1,4 +1,4 @@
-r"""What lenslets that are not square do to the light of a window, and the way from there to the sensor.
+r"""Light of a window through lenslets that are not square, and on to the sensor.
 
 A field V before them, on the even grid of a window of cells, becomes
 
@@ -35,7 +35,7 @@ class LensletWindow:
 
     @property
     def nbytes(self) -> int:
-        """Of the arrays."""
+        """Memory of the arrays [bytes]."""
         return self.lenslets.nbytes + self.path.nbytes
 
     def forward(self, fields: np.ndarray) -> np.ndarray:
@@ -56,7 +56,7 @@ class LensletWindow:
         return self._cut(found + self._gone(before * lenslets))
 
     def slopes(self, before: np.ndarray, given: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """By `lenslets` and `path` of a number, from those by `forward` of fields (..., n, n)."""
+        """Slopes of a number by `lenslets` and `path`, from those by `forward` of fields (..., n, n)."""
         seen = arrays.ifft2(self._whole(given))
         each = tuple(range(before.ndim - 2))
         by_path = (seen * arrays.fft2(before * self.lenslets)).sum(each)

@@ -1,4 +1,4 @@
-"""How many samples along a lenslet of a microscope pixels are interpolated from."""
+"""Number of samples along a lenslet of a microscope from which pixels are interpolated."""
 
 import math
 from dataclasses import replace

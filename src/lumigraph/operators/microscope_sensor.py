@@ -1,4 +1,4 @@
-"""From the pixels of a raw image to patterns of the lenslets' cells, and back."""
+"""Mapping of a raw image's pixels to patterns of the lenslets' cells, and back."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Pieces = Sequence[tuple[slice, Array]]
 
 
 class Sensor(Protocol):
-    """How patterns of cells make pixels."""
+    """Mapping of cells' patterns to pixels."""
 
     def parted(self, raw: Array) -> Array:
         """Transpose of `whole`: patterns (rows, columns, r) of each cell."""
@@ -29,7 +29,7 @@ class Sensor(Protocol):
 
 
 def sensor(patterns: Patterns, placement: Linear | None, like: Array) -> Sensor:
-    """For arrays of one library and precision."""
+    """Mapping for arrays of one library and precision."""
     if isinstance(placement, Resampling) and len(patterns.along) >= SEPARATE:
         y, x = (_pieces(axis, patterns.along, like) for axis in (placement.y, placement.x))
         return Straight(patterns, y, x, placement.shape[0])
@@ -38,24 +38,24 @@ def sensor(patterns: Patterns, placement: Linear | None, like: Array) -> Sensor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """By samples of the cells, from which a placement makes pixels; None where they are the pixels."""
+    """Mapping by samples of the cells, and a placement from them to pixels; None where they are pixels."""
 
     patterns: Patterns
     placement: Linear | None
 
     def parted(self, raw: Array) -> Array:
-        """See `Sensor`."""
+        """Patterns of each cell; see `Sensor`."""
         return parted(raw if self.placement is None else self.placement._adjoint(raw), self.patterns)
 
     def whole(self, parts: Array) -> Array:
-        """See `Sensor`."""
+        """Pixels (ny, nx); see `Sensor`."""
         plane = whole(parts, self.patterns)
         return plane if self.placement is None else self.placement._forward(plane)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Straight:
-    """By one matrix for each cell along y and one along x, where a straight lattice has such.
+    """Mapping by one matrix for each cell along y and one along x, where a straight lattice has such.
 
     They lead from pixels to even and odd sums along an axis, whose products patterns consist of: there are no
     samples between them.
@@ -76,7 +76,7 @@ class Straight:
     shape: Sequence[int]
 
     def parted(self, raw: Array) -> Array:
-        """See `Sensor`."""
+        """Patterns of each cell; see `Sensor`."""
         xp, n, rows = arrays.namespace(raw), len(self.patterns.along), len(self.y)
         down = xp.concat([m @ raw[pixels, :] for pixels, m in self.y])
         sides = self._sides(raw)
@@ -88,7 +88,7 @@ class Straight:
         return xp.reshape(xp.concat(found, axis=-1), (rows, len(self.x), -1))
 
     def whole(self, parts: Array) -> Array:
-        """See `Sensor`."""
+        """Pixels (ny, nx); see `Sensor`."""
         xp, n, rows = arrays.namespace(parts), len(self.patterns.along), len(self.y)
         flat, first, sides = xp.reshape(parts, (-1, self.patterns.count)), 0, self._sides(parts)
         for one, v in self._flat(sides, parts):
@@ -116,7 +116,7 @@ class Straight:
         return [_empty(like, (*shape, n, own.stop - own.start)) for own in self._along_x()]
 
     def _flat(self, sides: Sequence[Array], like: Array) -> list[tuple[Array, Array | None]]:
-        """Of each parity its products (cells, products), as views, and its vectors."""
+        """Products (cells, products) of each parity, as views, and its vectors."""
         xp, found = arrays.namespace(like), []
         vectors = self.patterns.separate(like)[1] or (None,) * 4
         rows = [xp.reshape(side, (len(self.y) * len(self.x), -1)) for side in sides]
@@ -127,7 +127,7 @@ class Straight:
 
 
 def _pieces(axis: Banded, along: np.ndarray, like: Array) -> Pieces:
-    """Of each cell the pixels that see it, and the matrix (n, pixels) from them to its products."""
+    """Pixels that see each cell, and the matrix (n, pixels) from them to its products."""
     n, ends = len(along), np.cumsum([len(m) for _, m in axis.blocks])
     first = np.array([start for start, _ in axis.blocks])
     last = first + [m.shape[1] for _, m in axis.blocks]

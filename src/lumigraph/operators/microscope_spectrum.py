@@ -1,15 +1,11 @@
 r"""A microscope's operator between spectra over its lenslets: each frequency has one small real matrix.
 
-Over lenslets the operator is a convolution. Its blocks are symmetric under flips, so that between parts that
-are even or odd over a cell (along y and along x), of the points c as of the pixels q, the transform of the
-blocks over the offsets d is real but for a factor, and the four frequencies (±f_y, ±f_x) share it:
-
 .. math:: \hat y_q = (-i)^{|q|} R\, (-i)^{|c|} \hat x_c, \quad
           R = (-1)^{q \cdot c} \sum_d K_{qc}(d)\, \mathrm{tr}(2\pi f_y d_y)\, \mathrm{tr}(2\pi f_x d_x)
 
-with tr the cosine where q and c have the same parity along that axis, the sine where not. Of the points and
-of the pixels few patterns are followed where they hold all images (`microscope_patterns`). It takes the same
-time however many lenslets a point lights. Large arrays of lenslets are treated in tiles (`microscope_tiles`).
+for parts c of the points and q of the pixels that are even or odd over a cell; tr is the cosine where their
+parities along an axis agree, else the sine (docs/theory/microscope.md). Few patterns of them are followed
+(`microscope_patterns`), in tiles of large arrays (`microscope_tiles`).
 """
 
 import itertools
@@ -77,12 +73,12 @@ def tiling(
 
 
 def matrix_numbers(told: Tiling, points: int, pixels: int) -> int:
-    """How many `matrices` has, for patterns of the points of all depths and of the image."""
+    """Numbers that `matrices` holds, for patterns of the points of all depths and of the image."""
     return told.frequencies * points * pixels
 
 
 def held_numbers(told: Tiling, points: Sequence[Patterns], pixels: Patterns) -> int:
-    """How many one application holds at most, beside `matrices`, the object and the image."""
+    """Numbers that one application holds at most, in addition to `matrices`, the object and the image."""
     counts = [sum(one.count for one in points[depths]) for depths in groups(points, told)]
     threads, columns = min(arrays.WORKERS, len(counts)), 4 * told.frequencies * told.count
     cells = max(math.prod(row.cells + 2 * max(row.margin, 0) for row in (told.rows, told.columns)), 1)
@@ -94,13 +90,13 @@ def held_numbers(told: Tiling, points: Sequence[Patterns], pixels: Patterns) -> 
 
 
 def cost(told: Tiling, points: int, pixels: int) -> float:
-    """Of one application of the operator or of its transpose [multiply-adds]."""
+    """Cost of one application of the operator or of its transpose [multiply-adds]."""
     passed = told.count * math.prod(told.lengths) * (points + pixels)
     return matrix_numbers(told, points, pixels) * (READ + 4.0 * told.count) + PASSED * passed
 
 
 def is_faster(kernels: Sequence[SliceKernel], told: Tiling, counts: tuple[int, int]) -> bool:
-    """Whether it takes less time than the products over all offsets."""
+    """True if it takes less time than the products over all offsets."""
     sampling = kernels[0].sampling
     products = sum(len(kernel.offsets) for kernel in kernels) * math.prod(told.cells) * sampling.classes
     return products * sampling.pixels**2 > cost(told, *counts)
@@ -154,7 +150,7 @@ class Spectra:
         placement: Linear | None = None,
         far: FarLight | None = None,
     ) -> "Spectra":
-        """In the library and precision of an array, for patterns of each depth and of the image."""
+        """Spectra in the library and precision of an array, for patterns of each depth and of the image."""
         points, pixels = patterns
 
         def found(depths: slice) -> Array:
@@ -216,7 +212,7 @@ class Spectra:
 
     @property
     def _points(self) -> int:
-        """Along a side of a cell."""
+        """Number of points along a side of a cell."""
         return math.isqrt(len(self.points[0].basis))
 
     def adjoint(self, images: Sequence[Array]) -> list[Array]:
@@ -320,13 +316,13 @@ def _odd(points: Sequence[Patterns]) -> np.ndarray:
 
 
 def _order(points: Sequence[Patterns]) -> np.ndarray:
-    """Of patterns of several depths: parity after parity, and in each depth after depth."""
+    """Order of the patterns of several depths: parity after parity, and in each depth after depth."""
     odd = np.concatenate([one.odd for one in points], axis=1)
     return np.argsort(2 * odd[0] + odd[1], kind="stable")
 
 
 def _places(points: Sequence[Patterns]) -> Iterator[np.ndarray]:
-    """Where the patterns of each depth stand in `_order`."""
+    """Places of each depth's patterns in `_order`."""
     stops = np.cumsum([one.count for one in points])
     return iter(np.split(np.argsort(_order(points)), stops[:-1]))
 

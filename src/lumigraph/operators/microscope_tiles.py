@@ -58,7 +58,7 @@ class Row:
 
     @cached_property
     def spans(self) -> tuple[Span, ...]:
-        """Of the tiles."""
+        """Spans of the tiles."""
         side = math.ceil(self.cells / self.count)
         starts = range(0, self.cells, side)
         return tuple(self._span(start, min(start + side, self.cells)) for start in starts)
@@ -74,7 +74,7 @@ class Row:
 
     @cached_property
     def length(self) -> int:
-        """Of the transforms of all tiles."""
+        """Length of the transforms of all tiles."""
         needed = max(span.length(self.reach) for span in self.spans)
         return int(scipy.fft.next_fast_len(needed, real=True) or needed)
 
@@ -98,12 +98,12 @@ class Tiling:
 
     @property
     def lengths(self) -> tuple[int, int]:
-        """Of the transforms along y and x."""
+        """Lengths of the transforms along y and x."""
         return self.rows.length, self.columns.length
 
     @property
     def frequencies(self) -> int:
-        """With matrices of their own: those of both signs share one."""
+        """Number of frequencies with separate matrices: those of both signs share one."""
         return math.prod(length // 2 + 1 for length in self.lengths)
 
     def tiles(self) -> Iterator[tuple[int, tuple[Span, Span]]]:
@@ -112,7 +112,7 @@ class Tiling:
 
 
 def tilings(cells: tuple[int, int], margin: int, reach: int, least: int) -> Iterator[Tiling]:
-    """Those with tiles of at least `least` lenslets to a side, the largest tiles first.
+    """Tilings with tiles of at least `least` lenslets to a side, the largest tiles first.
 
     >>> [told.lengths for told in tilings((20, 30), 4, 4, 10)]
     [(30, 40), (18, 24), (18, 18)]

@@ -105,7 +105,7 @@ def _backs(
 
 @remembered
 def waves(length: int, first: int, count: int, odd: int, of_image: bool) -> np.ndarray:
-    """From `count` lenslets, the first one at `first`, to two sums at each frequency f ≥ 0 (2 f, count).
+    """Matrix (2 f, count) from lenslets, the first one at `first`, to two sums at each frequency f ≥ 0.
 
     >>> waves(4, 0, 2, 0, False).round(6).tolist()
     [[1.0, 1.0], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, -1.0], [0.0, 0.0]]
@@ -121,7 +121,7 @@ def waves(length: int, first: int, count: int, odd: int, of_image: bool) -> np.n
 
 @remembered
 def back(length: int, first: int, count: int, odd: int, of_image: bool) -> np.ndarray:
-    """From those sums to the lenslets (count, 2 f), as the frequencies below 0 have the same.
+    """Matrix (count, 2 f) from those sums to the lenslets, as the frequencies below 0 have the same.
 
     >>> ((back(5, 1, 3, 1, True) @ waves(5, 1, 3, 1, True)).round(6) + 0.0).tolist()  # no -0.0
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]

@@ -1,15 +1,12 @@
 r"""Images of a point behind square lenslets as products of matrices along y and along x.
 
 A point's field before the lenslets is a sum of plane waves, each of which square lenslets turn into a Bloch
-wave b along each axis (`bloch`). So its field on the sensor is a product of matrices, and moving the point to
-(y, x) in its cell only turns phases:
+wave b along each axis (`bloch`). Moving the point to (y, x) in its cell only turns phases:
 
 .. math:: V = b_y^T \, e^{-2\pi i f y} \, P \, e^{-2\pi i f x} \, b_x
 
-P is the spectrum of the field, the same for all points of a depth. It is of low rank but for a small rest:
-over a square pupil a paraxial defocus would be of rank 1. All but P is nearly unitary, so the singular values
-that are left out tell what the field loses. Where the objective is round P is even or odd along y and along
-x, which halves its sides.
+P is the spectrum of the field, the same for all points of a depth. It is of low rank but for a small rest,
+which the left-out singular values measure: docs/theory/microscope.md.
 """
 
 import math
@@ -144,7 +141,7 @@ class Crossed:
         return turns, [(down, across) for down, across, _ in found], missing
 
     def _middle(self, fine: int, turns: np.ndarray, modes: Sequence[Pair], point: Point) -> np.ndarray:
-        """Of a point's image, on some grid."""
+        """Middle of a point's image, on some grid."""
         part = copy(self)
         part.fine, part.reach = fine, min(self.reach, MIDDLE)
         return part._seen(part._fields(turns, modes, [point])(point))[0]
@@ -152,7 +149,7 @@ class Crossed:
     def _fields(
         self, turns: np.ndarray, modes: Sequence[Pair], points: Sequence[Point]
     ) -> Callable[[Point], list[Pair]]:
-        """Gives what of a point's light does not interfere, along y and along x."""
+        """Function that returns the incoherent parts of a point's light, along y and along x."""
         waves = self._waves(turns)
 
         def moved(told: tuple[int, float]) -> list[np.ndarray]:
@@ -165,7 +162,7 @@ class Crossed:
         return lambda point: list(zip(found[0, point[0]], found[1, point[1]], strict=True))
 
     def held_bytes(self, points: int) -> float:
-        """Of what `images` holds at most, of points on so many lines along y and along x, in all threads."""
+        """Memory that `images` holds at most, for points on so many lines an axis, in all threads [bytes]."""
         modes, cells = self.objective.modes, 2 * self.reach + 1
         if self.sampling.degree:
             samples, of_each = (cells + 2 * self.guard) * self.fine, 64.0
@@ -191,7 +188,7 @@ class Crossed:
         return (self.lenslet.pitch / self.lenslet.magnification / self.sampling.points) ** 2
 
     def _place(self, k: float) -> float:
-        """Of a point, from its cell's middle [pitches]."""
+        """Place of a point, from its cell's middle [pitches]."""
         return (k - (self.sampling.points - 1) / 2) / self.sampling.points
 
     def _spectra(self, dz: float) -> tuple[np.ndarray, np.ndarray]:
@@ -222,7 +219,7 @@ class Crossed:
         return (u[:, :rank] * s[:rank]).T @ down, v[:rank] @ across, float(left[rank:][:1].sum())
 
     def _waves(self, turns: np.ndarray) -> np.ndarray:
-        """Behind the lenslets (m, nodes × samples): of each of a pixel's nodes, or on a grid for splines."""
+        """Waves behind the lenslets (m, nodes × samples): at a pixel's nodes, or on a grid for splines."""
         N, finest = self.sampling.pixels, finest_of(self.objective, self.lenslet, self.fine)
         told = self.lenslet, self.objective.wavelength, turns, finest
         if self.sampling.degree:
@@ -238,7 +235,7 @@ class Crossed:
 
     @property
     def _nodes(self) -> int:
-        """Of the quadrature over a pixel, along an axis.
+        """Number of nodes of the quadrature over a pixel, along an axis.
 
         Gauss and Legendre's needs more nodes than half the phase of the steepest light from the middle of a
         pixel to its edge. Measured beside four more: 20x/0.5 and 60x/1.2, 7 to 27 px behind a lenslet, two

@@ -1,4 +1,4 @@
-"""What lenslets that are missing take from the images of a cell's points, where two axes are not apart.
+"""Light of missing lenslets in the images of a cell's points, where two axes are not apart.
 
 Images are computed of those points from which all others follow (`few_points.Chosen`). The lenslets that
 exist lie between limits, so that their light is a difference of sums from one side: each lenslet is followed
@@ -77,7 +77,7 @@ class Missing:
             yield mine
 
     def images(self, offsets: Sequence[Offset]) -> dict[State, np.ndarray]:
-        """Of the chosen points at some offsets, one after the other: (n, samples) for each state."""
+        """Images of the chosen points at some offsets, one after the other: (n, samples) for each state."""
         numbers = np.concatenate([self._numbers(offset) for offset in offsets])
         found = {state: np.empty((len(numbers), self.samples), np.float32) for state in self.states}
 
@@ -95,7 +95,7 @@ class Missing:
         return found
 
     def _numbers(self, offset: Offset) -> np.ndarray:
-        """Of the chosen points (n, 2) at an offset, counted from the image's cell."""
+        """Numbers (n, 2) of the chosen points at an offset, counted from the image's cell."""
         points, (dy, dx) = self.cells.points, offset
         step = self.cells.shift(dy) * self.cells.step(points)
         y, x = np.divmod(self.chosen[offset].numbers, points[1])
@@ -128,21 +128,21 @@ class Missing:
         return result
 
     def _cuts(self, limits: Sequence[Limits]) -> list[float]:
-        """Where the lenslets between some limits begin and end, in order."""
+        """Places where the lenslets between some limits begin and end, in order."""
         return sorted({cut for pair in limits for cut in self._ends(pair) if cut > -math.inf})
 
     def _ends(self, limits: Limits) -> Limits:
         return limits[0] - self.slack, limits[1] + self.slack
 
     def _between(self, sums: Mapping[float, np.ndarray], limits: Limits) -> np.ndarray:
-        """Of the lenslets between limits; a copy."""
+        """Sum of the lenslets between limits; a copy."""
         low, high = self._ends(limits)
         return sums[high] - sums[low] if low in sums else sums[high].copy()
 
     def factors(
         self, offsets: Sequence[Offset], images: Images, least: float
     ) -> Callable[[dict[State, int], Offset], Found]:
-        """Of sums of some states' images, each times its sign, of the points at an offset."""
+        """Factors of sums of some states' images, each times its sign, of the points at an offset."""
         ends = np.cumsum([len(self.chosen[offset].numbers) for offset in offsets])
         places = {
             offset: slice(end - len(self.chosen[offset].numbers), end)

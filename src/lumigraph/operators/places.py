@@ -1,4 +1,4 @@
-"""Where cells of an array have blocks of their own: alike inside, in each row and column along its border."""
+"""Classes of cells with the same blocks: inside, and along each row and column of the array's border."""
 
 import math
 from collections.abc import Sequence
@@ -46,7 +46,7 @@ class Band:
 
     @property
     def border(self) -> float:
-        """How far the nearest border is from a cell's centre [m]."""
+        """Distance of the nearest border from a cell's centre [m]."""
         return min(map(abs, self.limits))
 
 
@@ -75,12 +75,12 @@ class Place:
 
     @property
     def state(self) -> State:
-        """Which lenslets there are."""
+        """Lenslets that exist around the cells."""
         return State(self.y.limits, self.x.limits, self.kind)
 
 
 def bands(optics: Optics, axis: int, parity: int = 0) -> list[Band]:
-    """Along y (0) or x (1, of rows of a parity); the first is all of the array's cells, without a border."""
+    """Bands along y (0) or x (1, of rows of a parity); the first is all of the array, without a border."""
     cells, extent = optics.cells, optics.array.extent
     size, n, pitch = cells.size[axis], cells.count[axis], optics.array.lattice.pitch
     first = cells.ring[axis]
@@ -106,7 +106,7 @@ def _near(border: float, far: float) -> float:
 
 
 def flipped(limits: Limits) -> Limits:
-    """Seen in a mirror."""
+    """Limits as seen in a mirror."""
     return -limits[1], -limits[0]
 
 
@@ -117,7 +117,7 @@ def inside(optics: Optics) -> list[Place]:
 
 
 def places(optics: Optics) -> list[Place]:
-    """Where blocks are added: along the borders and, where both are close, in the corners."""
+    """Places where blocks are added: along the borders and, where both are close, in the corners."""
     along_y, parities = bands(optics, 0), optics.cells.parities
     along_x = [bands(optics, 1, parity) for parity in parities]
     edges = [(y, parity, along_x[parity][0]) for y in along_y[1:] for parity in parities]
@@ -133,7 +133,7 @@ def places(optics: Optics) -> list[Place]:
 
 
 def _in_corner(optics: Optics, y: Band, x: Band) -> bool:
-    """Whether what is missing on two sides is not the sum of what is missing on each."""
+    """True if light missing on two sides is not the sum of the light missing on each."""
     far = optics.fineness.corner(_cells.fresnel_number(optics.camera), _cells.edges(optics.array))
     # What is missing is a product of both behind square lenslets, and round about the corner behind others.
     away = y.border + x.border if optics.straight else math.hypot(y.border, x.border)
@@ -141,7 +141,7 @@ def _in_corner(optics: Optics, y: Band, x: Band) -> bool:
 
 
 def _of(optics: Optics, wanted: Sequence[tuple[Band, int, Band]]) -> list[Place]:
-    """Those that hold cells, kind by kind."""
+    """Places that hold cells, kind by kind."""
     found, cells = [], optics.cells
     for y, parity, x in wanted:
         for kind in range(cells.kinds):
@@ -152,7 +152,7 @@ def _of(optics: Optics, wanted: Sequence[tuple[Band, int, Band]]) -> list[Place]
 
 
 def terms(place: Place) -> dict[State, int]:
-    """What is added at a place: a sum of blocks with the lenslets of a state."""
+    """Blocks added at a place: a signed sum of those with the lenslets of a state."""
     y, x, kind = place.y, place.x, place.kind
     if INFINITE in (y.limits, x.limits):  # along a border
         without = {} if y.ring or x.ring else {State(INFINITE, INFINITE, kind): -1}
@@ -183,7 +183,7 @@ def alike(wanted: Sequence[Place], even: tuple[bool, bool], square: bool) -> lis
 
 
 def _turned_key(place: Place, across: bool, up: bool, left: bool) -> tuple:
-    """What the blocks of the mirrored place depend on."""
+    """Key of the blocks of the mirrored place."""
     y, x = (
         (flipped(band.limits) if flip else band.limits, band.ring)
         for band, flip in zip((place.y, place.x), (up, left), strict=True)

@@ -41,7 +41,7 @@ class Regridded(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of the raw image, and of the object."""
+        """Shapes of the raw image, and of the object."""
         raw, own = self.of.shape
         return raw, (*own[:-2], *self.onto.shape[1])
 
@@ -59,12 +59,12 @@ class Regridded(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of the operator, and of a plane on the way [bytes]."""
+        """Memory of the operator, and of a plane on the way [bytes]."""
         return self.of.memory_bytes + self.onto.memory_bytes
 
     @property
     def error(self) -> float:
-        """Of the operator; a resampling adds what the object has above 2/3 of its samples' limit."""
+        """Error of the operator; a resampling adds what the object has above 2/3 of its samples' limit."""
         return self.of.error
 
 
@@ -121,7 +121,7 @@ def on_grid(operator: Linear, grid: Grid) -> Regridded:
 
 
 def _matrix(own: Grid, grid: Grid, axis: int) -> Banded:
-    """From the grid's samples along an axis to the operator's: points of light, as `represented` has them."""
+    """Matrix from the grid's samples along an axis to the operator's: points of light (`represented`)."""
     pitch = own.pitch[axis]
     rows, columns = ((g.y, g.x)[axis] / pitch for g in (own, grid))
     scale = grid.pitch[axis] / pitch

@@ -41,14 +41,14 @@ class Resampling(Linear):
         return self.y.up(self.x.left(raw))
 
     def of_part(self, part: Part, planes: np.ndarray) -> tuple[Part, np.ndarray]:
-        """Of planes that are dark but for a part (k, rows, columns): what part they light, and with what."""
+        """Lit part and values of planes that are dark but for a part (k, rows, columns)."""
         seen = (matrix.seeing(own) for matrix, own in zip((self.y, self.x), part, strict=True))
         (rows, down), (columns, across) = seen
         return (rows, columns), _along(down, _along(across, planes).swapaxes(1, 2)).swapaxes(1, 2)
 
     @property
     def memory_bytes(self) -> float:
-        """Of the matrices and of a picture on the way [bytes]."""
+        """Memory of the matrices and of a picture on the way [bytes]."""
         held = self.y.nbytes + self.x.nbytes
         between = min(self.y.rows * self.x.columns, self.y.columns * self.x.rows)
         return held + 4.0 * (between + self.y.rows * self.x.rows)

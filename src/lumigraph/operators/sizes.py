@@ -67,7 +67,7 @@ def wanted(optics: Optics) -> list[Place]:
 
 @dataclass(frozen=True, slots=True)
 class Factors:
-    """How many factors blocks have: a power of the points, as `benchmarks.memory --count` counts them.
+    """Number of factors of blocks: a power of the points, as `benchmarks.memory --count` counts them.
 
     Opaque rims make more of them; those at the border are fewer where only strong ones count, and the farther
     a row is from it.
@@ -86,7 +86,7 @@ class Factors:
 
     @classmethod
     def of(cls, optics: Optics) -> "Factors":
-        """Of one depth."""
+        """Factors of one depth."""
         cells, edges, finer = optics.cells, _cells.edges(optics.array), 1e-3 / optics.fineness.accuracy
         aside = tail(_cells.fresnel_number(optics.camera))
         # Of one cell, and of as many of them as there are in a square of so many pitches.
@@ -112,7 +112,7 @@ def _share(optics: Optics, place: Place) -> float:
 
 
 def _nearness(optics: Optics, band: Band) -> float:
-    """Of rows that lack lenslets on either side, over the outermost row; 0 where none is missed."""
+    """Factors of rows that lack lenslets on either side, over the outermost row's; 0 if none is missed."""
     pitch = optics.array.lattice.pitch
     farthest = optics.fineness.border(_cells.fresnel_number(optics.camera), optics.blur) + 1
     rows = [max(0.0, abs(limit) / pitch - 0.5) for limit in band.limits if math.isfinite(limit)]
@@ -122,7 +122,7 @@ def _nearness(optics: Optics, band: Band) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Few:
-    """What is computed of few points behind lenslets that are not square.
+    """Memory and time of images of few points behind lenslets that are not square.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class Few:
 
     @classmethod
     def of(cls, optics: Optics) -> "Few":
-        """Of one depth."""
+        """Memory and time for one depth."""
         cells, axes, kinds = optics.cells, optics.axes, optics.cells.kinds
         samples, pitch = math.prod(cells.samples), optics.array.lattice.pitch
         squared = optics.camera.wavelength * _cells.telecentric_distance(optics.camera)
@@ -236,5 +236,5 @@ def states_of(group: Iterable[Place]) -> set[State]:
 
 
 def symmetric(array: LensletArray) -> bool:
-    """Whether a lenslet's surroundings are the same in a mirror."""
+    """True if a lenslet's surroundings are the same in a mirror."""
     return array.lattice.kinds == 1 or isinstance(array.focal_length, float)

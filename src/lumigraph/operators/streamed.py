@@ -34,7 +34,7 @@ class Use:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Streamed:
-    """As `kernels.Matrix`, with parts that are computed whenever they are asked for.
+    """Matrix with parts that are computed on demand, as `kernels.Matrix`.
 
     Parameters
     ----------
@@ -99,14 +99,14 @@ class Streamed:
 
 
 def streamed(optics: Optics, progress: Progress | None = None) -> Streamed:
-    """Of one depth."""
+    """Streamed matrix of one depth."""
     builder = Builder(optics, lambda _: None, WORKERS)
     means = builder.means_at_the_end()
     return Streamed(builder, (glare([means], optics.cells),), optics.reach, progress)
 
 
 def uses(builder: Builder) -> dict[State, list[Use]]:
-    """Where the blocks of each state are used; those that mirror others' are not among the states."""
+    """Uses of the blocks of each state; those that mirror others' are not among the states."""
     optics = builder.optics
     (everywhere,) = ((place.rows, place.columns) for place in inside(optics))
     result: dict[State, list[Use]] = {INSIDE: [Use(everywhere, (False, False, False), 1, optics.reach)]}

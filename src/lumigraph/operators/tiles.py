@@ -14,7 +14,7 @@ from lumigraph.operators.turning import Crop, Turn, turn_margin
 
 
 def spread(optics: Optics, grid: Grid, points: Offset, ring: Offset) -> Linear:
-    """From an object's samples to so many points of each cell, in a ring around the array; turned with it."""
+    """Map from an object's samples to so many points of each cell, in a ring around the turned array."""
     cells, scale = optics.cells, -optics.distance / optics.camera.separation
     if not optics.rotation:
         return represented(grid, cells.grid(points, scale, ring), HALF_WIDTH)
@@ -38,7 +38,7 @@ def readout(optics: Optics) -> Linear:
 
 
 def _cropped(plane: Grid, wide: Offset, ring: Offset, per_cell: Offset) -> Crop:
-    """From cells in a wide ring to those in a narrower one."""
+    """Map from cells in a wide ring to those in a narrower one."""
     y, x = ((w - r) * n for w, r, n in zip(wide, ring, per_cell, strict=True))
     return Crop(plane.shape, (y, x))
 

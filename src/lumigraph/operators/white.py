@@ -1,8 +1,6 @@
 r"""White images before lenslets: the evenly lit stop of the main lens, without speckle.
 
-Light of a place u of the stop is a tilted wave in the lenslet plane. In the Fresnel approximation, without
-the phase exp(iπw²/(λL)) of that plane, tilting a wave moves its image by bu/L and changes its phase alone. So
-the white image is the image H of one wave along the axis, averaged over the image of the stop,
+It is the image H of one wave along the axis, averaged over the image of the stop (docs/theory/periodic.md),
 
 .. math:: I(s) = \frac{4}{\pi D^2} \int_{|u| < D/2} |H(s + b u / L)|^2 \, d^2u,
 
@@ -127,7 +125,7 @@ def endless(optics: Optics) -> tuple[np.ndarray, float]:
 
 
 def _pitches(optics: Optics) -> float:
-    """How far light is followed: as the accuracy asks, and no farther than the image or the memory reach."""
+    """Distance to which light is followed [pitches]: by the accuracy, within the image and the memory."""
     array = optics.array
     number, rims = _cells.fresnel_number(optics.camera), _cells.edges(array)
     pitches = FARTHER * optics.fineness.neighbours(number, 0.0, rims)
@@ -156,13 +154,13 @@ def _aside(optics: Optics, pitches: float) -> float:
 
 
 def _stop_radius(optics: Optics) -> float:
-    """Of the stop's image behind a lenslet [m]."""
+    """Radius of the stop's image behind a lenslet [m]."""
     camera = optics.camera
     return camera.pupil_diameter / 2 * _cells.telecentric_distance(camera) / camera.separation
 
 
 def _far(wave: WaveImage) -> np.ndarray:
-    """What all lenslets bring to each cell of the image from farther than they are followed: up to 1."""
+    """Light of all lenslets in each cell of the image, from farther than they are followed: up to 1."""
     cells, reach = wave.optics.cells, wave.sides[0].axis.neighbourhood
     if wave.sides[0].endless:
         return np.ones(cells.image)
@@ -240,7 +238,7 @@ class _Leaning:
     lean: tuple[Weight, Weight]
 
     def __call__(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """At frequencies (y, x) [1/m]."""
+        """Transform at frequencies (y, x) [1/m]."""
         turns = 2 * math.pi * self.radius * max(np.abs(y).max(), np.abs(x).max())
         angles, place, shares = disc(48 + math.ceil(1.2 * turns))
         down, across = np.sin(angles), place
@@ -259,7 +257,7 @@ def _lagrange(places: np.ndarray, number: int) -> Weight:
 
 @dataclass(frozen=True, slots=True)
 class _Frequencies:
-    """Of an image along one axis, with dark cells beside it into which it may spread.
+    """Frequencies of an image along one axis, with dark cells beside it into which it may spread.
 
     Parameters
     ----------
@@ -302,7 +300,7 @@ class _Frequencies:
 
     @property
     def length(self) -> float:
-        """Of all cells [m]."""
+        """Length of all cells [m]."""
         return self._all * self.optics.cells.size[self.which]
 
     @property
@@ -311,7 +309,7 @@ class _Frequencies:
         return np.round(fft.fftfreq(self.coarse) * self.coarse).astype(int)
 
     def moved(self) -> np.ndarray:
-        """From the middle of the fine samples to that of the coarse ones, and their number (coarse,)."""
+        """Phase (coarse,) from the middle of the fine samples to the coarse ones', times counts' ratio."""
         shift = 1 / self.coarse - 1 / self.fine
         return np.exp(1j * np.pi * self.number * shift) * (self.coarse / self.fine)
 
@@ -326,7 +324,7 @@ class _Even:
 
     @classmethod
     def of(cls, image: np.ndarray, optics: Optics) -> "_Even":
-        """Of an image (cells, samples, cells, samples)."""
+        """Transform of an image (cells, samples, cells, samples)."""
         y, x = (_Frequencies(optics, k, *image.shape[2 * k : 2 * k + 2]) for k in (0, 1))
         spectrum = arrays.rfft2(image.reshape(y.given, x.given), (y.fine, x.fine))
         spectrum = spectrum[y.number][:, : x.coarse // 2 + 1]

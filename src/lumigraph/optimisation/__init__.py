@@ -1,12 +1,10 @@
-"""The camera that does something best, of all that can be made: `optimise`.
+"""Search for the camera that reaches a goal best, of all that can be made: `optimise`.
 
 - `optimise`: `optimise` and its result, an `Optimum`
-- `goals`: what is made best: bounds of a point's place, or a number of the description
-- `space`: what may change, and which cameras that gives
-- `evaluations`: each camera once, noted in a ledger, so that a search goes on after a kill
-- `tried`: what fits and reconstructions reach in drawn noise, beside what was expected
-- `search`: a grid, then downhill from its best, or over all of the ranges
-- `gradient`: downhill by derivatives, of what has some
+- `goals`: bounds of a point's place, errors of scenes, or a number of the description; `space`: what may vary
+- `evaluations`: each camera once, noted in a ledger, so that a search can be resumed
+- `search`, `gradient`: a grid, then downhill from its best, or over all of the ranges; by derivatives
+- `tried`: errors of fits and reconstructions in drawn noise, beside the expected ones
 - `front`: the cameras that no other beats in both of two goals
 - `mask`: `depth_mask`, a phase in the pupil that leaves detail alike over a range of defocus
 """

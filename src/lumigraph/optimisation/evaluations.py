@@ -1,4 +1,4 @@
-"""Cameras that a search asks for, each computed once and noted in a ledger."""
+"""Cameras of a search, each computed once and noted in a ledger."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -25,7 +25,7 @@ APART = 1e-4
 
 @dataclass(eq=False)
 class Evaluations:
-    """What is known of each camera, in the order in which a search asks.
+    """Values of each camera, in the order of the search.
 
     Parameters
     ----------
@@ -69,17 +69,17 @@ class Evaluations:
 
     @cached_property
     def _noted(self) -> dict[str, dict[str, Any]]:
-        """Rows that the ledger has from before, whichever search asked for them."""
+        """Rows that the ledger has from before, whichever search computed them."""
         entries = {} if self.ledger is None else self.ledger.entries()
         rows = [entry.values for entry in entries.values()]
         return {_key({name: row[name] for name in self.names if name in row}): row for row in rows}
 
     def cost(self, item: Mapping[str, Any]) -> float:
-        """Of an item, as `Goal.cost`."""
+        """Cost of an item, as `Goal.cost`."""
         return self.goal.cost(self.row(item))
 
     def slopes(self, item: Mapping[str, Any], space: Space) -> np.ndarray:
-        """Of the cost by the parts of the ranges (n,), from cameras a little to either side that can be."""
+        """Derivatives of the cost by the parts of the ranges (n,), from possible cameras to either side."""
         parts, sides = np.array(space.parts(item)), np.eye(len(space.ranges)) * APART
         pairs, widths = [], []
         for side in sides:

@@ -11,7 +11,7 @@ from lumigraph.optimisation.search import Search, refined
 from lumigraph.optimisation.space import Space
 
 WEIGHTS = (0.5, 0.2, 0.8)
-"""Of the first goal, in searches between the ends of a front."""
+"""Weights of the first goal, in searches between the ends of a front."""
 
 SLIGHT = 0.01
 """Weight of the costs' sum beside the larger one: of two cameras alike in that, the better is taken."""
@@ -33,7 +33,7 @@ class Towards:
         return self.cameras.rows
 
     def cost(self, item: Mapping[str, Any]) -> float:
-        """Of an item."""
+        """Cost of an item."""
         return self.by(self.cameras.row(item))
 
 

@@ -1,4 +1,4 @@
-"""What is made best of a camera."""
+"""Goals of a search: the quantity of a camera that is optimised."""
 
 import math
 import warnings
@@ -60,7 +60,7 @@ class Judged(NamedTuple):
     error
         Relative: of the derivatives, or what places and steps change of the bound where that is more.
     over_depths
-        The bound at each depth (nz,); infinite where it is not told.
+        The bound at each depth (nz,); infinite where it is not determined.
     between
         The bound half-way between neighbouring depths, rms, at the other places; NaN of one depth.
     """
@@ -113,7 +113,7 @@ class Goal:
         *,
         scenes: Scenes | None = None,
     ) -> "Goal":
-        """From words such as "depth", "largest views per axis" or "least cross-talk".
+        """Goal from words such as "depth", "largest views per axis" or "least cross-talk".
 
         Raises
         ------
@@ -142,12 +142,12 @@ class Goal:
 
     @property
     def of_points(self) -> bool:
-        """Whether it follows from images of points."""
+        """True if the goal follows from images of points."""
         return self.name in BOUNDS or self.name == LIGHT
 
     @property
     def judged(self) -> bool:
-        """Whether the best camera is judged anew, beside where it was searched."""
+        """True if the best camera is judged anew, at other places than those of the search."""
         return self.name in BOUNDS or self.name in ERRORS
 
     @property
@@ -156,13 +156,13 @@ class Goal:
         return f"{self.name} bound" if self.name in BOUNDS else self.name
 
     def ready(self, instrument: Instrument) -> "Goal":
-        """With scenes that the first camera resolves, where it needs some and has none."""
+        """Goal with scenes that the first camera resolves, where it needs some and has none."""
         if self.name not in ERRORS or self.scenes is not None:
             return self
         return replace(self, scenes=usual_scenes(instrument))
 
     def check(self, instrument: Instrument) -> None:
-        """Refuse what a kind of instrument has not.
+        """Refuse a goal that a kind of instrument does not have.
 
         Raises
         ------
@@ -276,7 +276,7 @@ class Goal:
         return float(getattr(found, self.name))
 
     def _halves(self) -> tuple[float, ...]:
-        """Half-way between neighbouring depths."""
+        """Depths half-way between neighbouring ones."""
         depths = np.unique(self.depths)
         return tuple(float(dz) for dz in (depths[1:] + depths[:-1]) / 2)
 
@@ -311,7 +311,7 @@ class Goal:
         return {self.name: found.value, UNCERTAIN: found.uncertain, "photons": light.photons}
 
     def light_of(self, instrument: Instrument, first: float) -> Light:
-        """What an instrument gets by its aperture; `first` as of `values`."""
+        """Light that an instrument collects by its aperture; `first` as of `values`."""
         return Light(self.light.photons * collected(instrument) / first, self.light.background)
 
     def _rounds(self) -> tuple[range, ...]:
@@ -328,7 +328,7 @@ class Goal:
         }  # fmt: skip
 
     def _even(self, instrument: Instrument, light: Light) -> Bounds:
-        """Of some places, and of more until the bound is even."""
+        """Bounds at some places, and at more until they are even."""
         first, *more = self._rounds()
         found = bounds(instrument, self.depths, light, places=first, checked=False)
         for numbers in more:
@@ -338,7 +338,7 @@ class Goal:
         return found
 
     def cost(self, values: Mapping[str, Any]) -> float:
-        """What a search makes small; infinite where there is no such camera."""
+        """Cost that a search minimises; infinite where there is no such camera."""
         value = values.get(self.name)
         if value is None or not math.isfinite(value):
             return math.inf

@@ -1,4 +1,4 @@
-"""Downhill by gradients, within ranges and around cameras that cannot be."""
+"""Descent by gradients, within ranges and around impossible cameras."""
 
 import math
 from collections.abc import Callable
@@ -9,19 +9,19 @@ SPREAD = 0.15
 """Longest first step of a search, as a part of each range."""
 
 SHORT = 1e-3
-"""Part of a step to which it is shortened at most, where cameras on its way cannot be or are worse."""
+"""Part of a step to which it is shortened at most, where cameras on its way are impossible or worse."""
 
 ENOUGH = 1e-4
 """Relative gain of two steps, below which they lead no farther."""
 
 SLIGHT, LEAST = 1e-3, 1e-6
-"""Of what a gradient promises, what a step must keep; and what counts as no slope."""
+"""Part of a gradient's promise that a step must keep, and the least slope."""
 
 
 def downhill(
     cost: Callable[[np.ndarray], float], slopes: Callable[[np.ndarray], np.ndarray], start: np.ndarray
 ) -> None:
-    """Quasi-Newton steps by gradients, within the ranges and around cameras that cannot be."""
+    """Quasi-Newton descent by gradients, within the ranges and around impossible cameras."""
     at, here, slope, last = start, cost(start), slopes(start), math.inf
     curve = np.eye(len(at)) * SPREAD / max(float(np.abs(slope).max()), LEAST)
     while True:
@@ -36,7 +36,7 @@ def downhill(
 def _step(
     cost: Callable[[np.ndarray], float], at: np.ndarray, known: tuple[float, np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, float] | None:
-    """Where a step downhill leads, and the cost there; None where none does."""
+    """Point that a step downhill leads to, and the cost there; None where no step does."""
     here, slope, curve = known
     free = ~(((at <= 0) & (slope > 0)) | ((at >= 1) & (slope < 0)))
     for by in (curve, np.diag(np.diag(curve))):  # what steps before told may mislead

@@ -1,15 +1,12 @@
 r"""`depth_mask`: a phase in the pupil that leaves detail alike over a range of defocus.
 
-One filter is to undo the blur of every depth. Of detail of a spatial frequency, met with equal chance at each
-defocus ψ, the best linear filter leaves a mean squared error
+The best linear filter for all defoci ψ of detail of a spatial frequency leaves the mean squared error
 
 .. math:: 1 - \frac{|\langle H_\psi \rangle|^2}{\langle |H_\psi|^2 \rangle + \epsilon}
 
-with the transfer functions H and the power of the noise over that of the detail, ε (Wiener). It falls where
-detail changes least with defocus and does not vanish. Its mean over all frequencies is made small, by
-gradients through the transfer functions: they are autocorrelations of the pupil, computed by FFTs.
-
-E. R. Dowski & W. T. Cathey, Appl. Opt. 34, 1859 (1995), found a cubic phase for square pupils.
+with the transfer functions H and the relative power of the noise, ε (Wiener). Its mean over all frequencies
+is minimised by gradients: see docs/theory/optimisation.md. E. R. Dowski & W. T. Cathey, Appl. Opt. 34, 1859
+(1995), found a cubic phase for square pupils.
 """
 
 import math
@@ -23,7 +20,7 @@ from lumigraph.elements.zernike import noll_to_nm, zernike
 from lumigraph.errors import GeometryError
 
 RADIUS, SAMPLES = 16, 72
-"""Of the pupil in samples, and the window's: all of its autocorrelation has room."""
+"""Radius of the pupil in samples, and width of the window: all of its autocorrelation has room."""
 
 EDGE = 1.9
 """Highest frequency that counts, of the pupil's radius; 2 is the cut-off, where nothing is left."""

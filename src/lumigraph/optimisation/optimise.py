@@ -51,7 +51,7 @@ class Optimum:
     active
         Values of the best at an end of their range, by key: another range would give a better camera.
     rows
-        All cameras, in the order of the search; those that cannot be have an "error".
+        All cameras, in the order of the search; impossible ones have an "error".
     checked
         Of bounds and errors of reconstruction: by "start", "swept" and "best", the bound at other places than
         those of the search, by derivatives of two steps where they are not exact, its relative error, at
@@ -62,7 +62,7 @@ class Optimum:
     front
         With two goals: the rows that no other beats in both, from the best in the first on.
     tried
-        By "start" and "best", what fits or reconstructions reach in drawn raw images; empty without trials.
+        By "start" and "best", errors of fits or reconstructions in drawn raw images; empty without trials.
     held_out
         By "start", "swept" and "best", errors of scenes that took no part in the search; empty without any.
     """
@@ -83,7 +83,7 @@ class Optimum:
     __repr__ = brief
 
     def gain(self, beside: Mapping[str, Any]) -> float:
-        """By what part of it the goal is better than that of other values; NaN where those have none."""
+        """Relative gain of the goal over other values; NaN where those have none."""
         other = beside.get(self.goal.name, float("nan"))
         change = (self.best[self.goal.name] - other) / abs(other)
         return change if self.goal.largest else -change
@@ -158,8 +158,8 @@ def optimise(
         reconstruction: 16 squares of them at most are seen with noise by the camera as given, the best of the
         grid and the best, and reconstructed as if they were the goal's scenes.
     output
-        File, beside which each camera is noted as it is done: the same call goes on after a kill, to the same
-        result. None for nowhere. The best camera is not written.
+        File, beside which each camera is noted as it is done. Safe to interrupt: the same call resumes, to
+        the same result. None for nowhere. The best camera is not written.
     progress
         Called as ``progress(fraction)``.
     estimated
@@ -170,8 +170,8 @@ def optimise(
     FormatError
         An unknown key or number, a range that does not go up, an output of another search.
     GeometryError
-        A goal that the instrument has not, or none of the first values gives a camera. Gradients of another
-        instrument or goal than bounds of those, by its sensor, or with a second goal.
+        A goal that the instrument does not have, or none of the first values gives a camera. Gradients of
+        another instrument or goal than bounds of those, by its sensor, or with a second goal.
 
     Warns
     -----
@@ -228,7 +228,7 @@ def optimise(
         swept = grid(cameras, space)
         if swept is None:
             reason = cameras.rows[1].get(ERROR, f"{aim.name} is not known of it")
-            raise GeometryError(f"none of the first {len(items)} cameras can be, such as: {reason}")
+            raise GeometryError(f"none of the first {len(items)} cameras is possible, such as: {reason}")
         best = _refined(cameras, space, swept, (search, most, seed))
         if other is not None and beyond:
             trace(cameras, space, (aim, other), (search, most, seed))
@@ -246,7 +246,7 @@ def optimise(
 
 
 def _other(text: str) -> dict[str, Any]:
-    """What a second goal has of its own."""
+    """Name and direction of a second goal."""
     found = Goal.parse(text)
     return {"name": found.name, "largest": found.largest}
 
@@ -287,7 +287,7 @@ def _elsewhere(cameras: Evaluations, items: Mapping[str, Mapping[str, Any]]) -> 
 def _tried(
     cameras: Evaluations, items: Mapping[str, Mapping[str, Any]], how: tuple[int, int]
 ) -> dict[str, Tried]:
-    """What reconstruction reaches before some items."""
+    """Errors that reconstruction reaches before some items."""
     goal, found = cameras.goal, {}
     for which, item in items.items() if how[0] else ():
         row = cameras.row(item)
@@ -313,7 +313,7 @@ def _reached(
 
 
 def _warn_of_held_out(found: Optimum) -> None:
-    """Say where others reconstruct held-out scenes as well as the best."""
+    """Warn where other cameras reconstruct held-out scenes as well as the best."""
     best, told = found.held_out.get("best", Tried(reason="there are none")), found.goal.told
     for which, words in BEFORE.items():
         other = found.held_out.get(which, best)
@@ -332,7 +332,7 @@ def _warn_of_held_out(found: Optimum) -> None:
 
 
 def _warn_of_luck(found: Optimum) -> None:
-    """Say where a bound is of the places or depths at which it was searched, not of the camera."""
+    """Warn where a bound owes its value to the places or depths at which it was searched."""
     if "best" not in found.checked:
         return
     name, told, label = found.goal.name, found.goal.told, found.goal.label
@@ -356,7 +356,7 @@ def _warn_of_luck(found: Optimum) -> None:
 
 
 def _luck_of_depths(found: Optimum) -> Iterator[str]:
-    """Where a bound is worse half-way between its depths, ends left out, or others are better in all."""
+    """Warnings where a bound is worse half-way between its depths, ends left out, or others are better."""
     label, told, best = found.goal.label, found.goal.told, found.checked["best"]
     both = math.hypot(best.value, best.between)
     if best.between > best.value * (1 + LUCK):

@@ -13,7 +13,7 @@ from lumigraph.optimisation.space import Space
 Search = Literal["grid", "local", "global", "gradient"]
 
 FINE = 1e-3
-"""Of a simplex at last, and of its costs."""
+"""Relative size of a simplex at last, and spread of its costs."""
 
 Slopes = Callable[[Mapping[str, Any]], np.ndarray]
 
@@ -33,7 +33,7 @@ class Costs(Protocol):
         ...
 
     def cost(self, item: Mapping[str, Any]) -> float:
-        """Of an item; infinite where there is no such camera."""
+        """Cost of an item; infinite where there is no such camera."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""What may change of a camera: ranges, whose counts make a first grid, and values of a stock."""
+"""Values of a camera that may vary: ranges, whose counts make a first grid, and values of a stock."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -46,7 +46,7 @@ class Range:
         return self.at(part) if -ROUNDED <= part <= 1 + ROUNDED else None
 
     def part(self, value: Any) -> float:
-        """Where in the range a value is, 0 to 1."""
+        """Relative place of a value in the range, 0 to 1."""
         found = NUMBER.fullmatch(str(value))
         assert found is not None
         return (float(found[1]) - self.low) / (self.high - self.low)
@@ -59,7 +59,7 @@ class Space:
     Parameters
     ----------
     grid
-        First values of each key: of a range evenly spaced, of a stock all.
+        First values of each key: evenly spaced over a range, all of a stock.
     ranges
         By key, of what changes continuously.
     """
@@ -69,7 +69,7 @@ class Space:
 
     @classmethod
     def of(cls, vary: Mapping[str, str] | Sequence[str]) -> "Space":
-        """From texts as `lumigraph sweep --vary` takes them: 'first:last:count' is a range, a list a stock.
+        """Space from texts as `lumigraph sweep --vary` takes them: ranges 'first:last:count', or stocks.
 
         Raises
         ------
@@ -95,7 +95,7 @@ class Space:
         return cls(grid, ranges)
 
     def combinations(self) -> list[dict[str, Any]]:
-        """Of the first values."""
+        """Items of all combinations of the first values."""
         return combinations(self.grid)
 
     def own(self, camera: Instrument) -> dict[str, Any] | None:
@@ -119,7 +119,7 @@ class Space:
         return {**item, **found}
 
     def parts(self, item: Mapping[str, Any]) -> list[float]:
-        """Where in its ranges an item is."""
+        """Relative places of an item in its ranges, 0 to 1."""
         return [one.part(item[name]) for name, one in self.ranges.items()]
 
     def active(self, item: Mapping[str, Any]) -> dict[str, Any]:
@@ -140,7 +140,7 @@ def _same(here: Any, stock: Sequence[Any]) -> Any:
 
 
 def _number(value: Any) -> float:
-    """Of a value in SI, or without a unit; NaN of a word."""
+    """Number of a value in SI, or without a unit; NaN for a word."""
     found = NUMBER.fullmatch(str(value))
     if found is None:
         return math.nan

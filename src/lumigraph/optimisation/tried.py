@@ -1,4 +1,4 @@
-"""What reconstruction reaches of a bound or an expected error: in drawn noise, of one camera."""
+"""Errors of reconstruction in drawn noise, beside a bound or an expected error, for one camera."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from lumigraph.instruments.instrument import Instrument
 from lumigraph.optimisation.goals import BOUNDS, ERRORS, Goal
 
 ACCURACY = 1e-2
-"""Of images of points."""
+"""Accuracy of images of points."""
 
 MOST = 10_000
 """Raw images at each depth."""
@@ -55,7 +55,7 @@ class Tried:
     reason: str = ""
 
     def gain(self, beside: "Tried") -> tuple[float, float]:
-        """By what part the rms is less than that of the same scenes otherwise, and its standard error."""
+        """Relative gain of the rms over that of the same scenes otherwise, and its standard error."""
         ratio = self.reached / beside.reached
         off = (self.squares - ratio**2 * beside.squares) / beside.reached**2
         return 1 - ratio, float(off.std(ddof=1)) / math.sqrt(len(off)) / 2 / ratio

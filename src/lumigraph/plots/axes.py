@@ -1,4 +1,4 @@
-"""What every drawing shares: a figure without a window, axes with lengths in a readable unit, colour bars."""
+"""Common parts of drawings: a figure without a window, axes with lengths in a readable unit, colour bars."""
 
 from io import BytesIO
 from typing import Any

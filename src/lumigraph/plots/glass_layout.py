@@ -11,7 +11,7 @@ MM = 1e3
 COLOURS, GLASS, DARK, AXIS = ("#c1272d", "#0071bc"), "#9ec9e2", "#333333", "#8a8a8a"
 
 BESIDE = 0.25
-"""Of the lens' length, what is shown before and behind it."""
+"""Length shown before and behind the lens, over the lens'."""
 
 
 def whole(axes: Axes, drawn: GlassLayout) -> None:

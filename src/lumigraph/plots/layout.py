@@ -22,10 +22,10 @@ FAN = ("#7a4fa3", "#c1272d", "#e08a00", "#2e8b57", "#0071bc")
 
 
 class Camera(Protocol):
-    """What `layout` asks of an instrument."""
+    """Instruments that `layout` can draw."""
 
     def layout(self) -> Layout | MicroscopeLayout:
-        """Its distances and sizes."""
+        """Distances and sizes of the instrument."""
         ...
 
 
@@ -208,7 +208,7 @@ def _ray(
     ends: tuple[float, float],
     colour: str | None,
 ) -> None:
-    """From height u on the main lens towards the image point Y, through the nearest lenslet to the sensor."""
+    """Draw a ray from height u on the main lens towards the image point Y, through the nearest lenslet."""
     (drawn, lenslets), (image, u) = camera, ends
     slope = (image - u) / drawn.image_distance
     at_lenslets = u + slope * drawn.separation

@@ -23,7 +23,7 @@ Plane = tuple[float, float, str]
 
 
 def planes(drawn: MicroscopeLayout) -> list[Plane]:
-    """From the object to the lenslets."""
+    """Planes from the object to the lenslets: position, focal length, name."""
     image = 2 * OBJECTIVE + 2 * TUBE
     tube = f"tube lens\nf = {_length(drawn.tube_lens)}" if drawn.tube_lens else "tube lens"
     found = [

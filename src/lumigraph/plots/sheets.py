@@ -15,7 +15,7 @@ RULER = 0.1
 """Length of the rulers [m]."""
 
 BESIDE = (0.020, 0.014, 0.008)
-"""What is kept free: below for a ruler and the text, at the left for a ruler, elsewhere [m]."""
+"""Margins: below for a ruler and the text, at the left for a ruler, elsewhere [m]."""
 
 
 def room(paper: tuple[float, float]) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""What a picture says about the camera that its file describes: `implied`."""
+"""Comparison of a picture with the camera that its file describes: `implied`."""
 
 import math
 from functools import cached_property
@@ -17,11 +17,11 @@ class Described(Protocol):
 
     @cached_property
     def calibration(self) -> Calibration | None:
-        """Where its micro-images should stand; None without lenslets."""
+        """Expected positions of the micro-images; None without lenslets."""
         ...
 
     def would_be(self, share: float) -> str:
-        """What of it would explain a lattice that is so many times as large."""
+        """Change of the description that would explain a lattice so many times as large."""
         ...
 
 
@@ -35,7 +35,7 @@ def implied(seen: Lattice, camera: Described, *, used: bool = True) -> tuple[str
     camera
         Whose file says where its micro-images should stand.
     used
-        Whether it is the picture's lattice that is used, not the camera's.
+        True if the picture's lattice is used, not the camera's.
 
     Returns
     -------

@@ -33,7 +33,7 @@ class Beside:
                 check_alike(name, picture, raw)
 
     def doubt(self, raw: RawImage) -> str | None:
-        """What to say of a raw image that is darker than its dark level on average, as no light makes it."""
+        """Warning text for a raw image darker on average than its dark level; None if it is not."""
         some = slice(None, None, math.ceil(math.prod(raw.data.shape) / _LOOKED_AT))
         values, dark = to_numpy(raw.data)[some], self.dark or black_plane(raw)
         black = 0.0 if dark is None else float(to_numpy(dark.data)[some].mean(dtype=float))
@@ -52,7 +52,7 @@ class Beside:
         return level if level.ndim == 2 else level.max(-1)
 
     def notes(self, raw: RawImage, *, divide: bool) -> tuple[str, ...]:
-        """What is done with them."""
+        """Notes on how the dark and the white image are used."""
         done = ("subtracted", "divided out") if divide else ("in the model", "in the model")
         pictures = [("dark image", self.dark, done[0]), ("white image", self.white, done[1])]
         if self.dark is None:
@@ -87,7 +87,7 @@ def coloured(even: RawImage, raw: RawImage) -> RawImage:
     even
         Values above the dark, over the white image.
     raw
-        As it was read: its bits and recorded levels say what is full.
+        Raw image as it was read: its bits and recorded levels say what is full.
     """
     black, white = levels(raw)
     if raw.bit_depth is None and "white_level" not in raw.metadata:

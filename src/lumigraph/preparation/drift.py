@@ -1,4 +1,4 @@
-"""Whether a raw image stands on the lattice of a calibration, by the dark gaps that it carries itself."""
+"""Agreement of a raw image with the lattice of a calibration, by its own dark gaps."""
 
 import math
 import warnings
@@ -44,10 +44,10 @@ class Drift:
     rotation, expected_rotation
         The same of the rows, from +x towards +y [rad].
     slip
-        How far the two lattices are apart at the border of the picture where they agree in its middle
+        Distance between the two lattices at the border of the picture where they agree in its middle
         [pitches]; from a half on, pixels there belong to another lenslet.
     shift
-        Of the mean micro-image from where the calibration has it (y, x) [px]; None where it is not seen.
+        Shift of the mean micro-image from its calibrated place (y, x) [px]; None where it is not visible.
     evidence
         Lines of the lattice in the spectrum of the raw image's gaps over their surroundings.
     error
@@ -79,9 +79,9 @@ class Drift:
         return replace(expected, basis=((yj, xj), (yi, xi)))
 
     def told(self) -> str:
-        """How well the lattices agree, in one line."""
+        """Agreement of the lattices, in one line."""
         unsure = self.slip >= _SLIGHT and self.slip < _SIGMAS * self.error
-        doubt = f", which its gaps tell to ±{_SIGMAS * self.error:.2f} only" if unsure else ""
+        doubt = f", known only to ±{_SIGMAS * self.error:.2f}" if unsure else ""
         return f"the raw image's own lattice slips by {self.slip:.2f} of a pitch towards the border{doubt}"
 
     def report(self) -> str:
@@ -100,8 +100,8 @@ def drift(data: Array, calibration: Calibration) -> Drift | None:
     Only a picture with light behind lenslets all over is judged: points before a dark ground repeat, too.
     Dark gaps between micro-images leave lines in the spectrum at the lattice's harmonics. The lattice is
     searched for by its first ones, within 25 % of the calibration's pitch and 6° of its rotation, and
-    refined on those that follow. A raw image without gaps, or of fewer than some 14 lenslets across, tells
-    nothing.
+    refined on those that follow. A raw image without gaps, or of fewer than some 14 lenslets across, gives
+    None.
     """
     picture, corner = _middle(to_numpy(data))
     basis, waves = _expected(calibration, picture.shape, corner)
@@ -132,7 +132,7 @@ def drift(data: Array, calibration: Calibration) -> Drift | None:
 def check_drift(data: Array, calibration: Calibration, camera: Described | None = None) -> Drift | None:
     """Refuse a raw image (y, x[, c]) that carries another lattice than the calibration's.
 
-    Where that is a camera's own, by its file, what of the file would explain the raw image is told, too.
+    If that lattice is a camera file's, the error also names the change of the file that would explain it.
 
     Returns
     -------
@@ -147,7 +147,7 @@ def check_drift(data: Array, calibration: Calibration, camera: Described | None 
     Raises
     ------
     CalibrationError
-        They slip by more than half a pitch, so that pixels belong to other lenslets; both are told.
+        They slip by more than half a pitch, so that pixels belong to other lenslets; the message has both.
     """
     found = drift(data, calibration)
     if found is not None:
@@ -156,7 +156,7 @@ def check_drift(data: Array, calibration: Calibration, camera: Described | None 
 
 
 def verdict(found: Drift) -> str:
-    """What a drift means for a calibration: "refused", "warned", "shifted" or "fits"."""
+    """Verdict of a drift on a calibration: "refused", "warned", "shifted" or "fits"."""
     sure = found.slip >= _SIGMAS * found.error
     if sure and found.slip >= _CERTAIN:
         return "refused"

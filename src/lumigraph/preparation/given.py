@@ -39,7 +39,7 @@ class Given:
         Parameters
         ----------
         raw
-            As it was read.
+            Raw image as it was read.
         even
             False where the white image only gives the lattice and is not divided out.
         options
@@ -62,7 +62,7 @@ class Given:
 
 
 def _stamp(path: Path) -> tuple[int, int]:
-    """What changes when a file does."""
+    """Size and time of modification of a file, which change when it does."""
     known = path.stat() if path.exists() else None
     return (0, 0) if known is None else (known.st_size, known.st_mtime_ns)
 
@@ -101,9 +101,9 @@ def read_pages(path: Path, pages: str | None = None, *, one: bool = False) -> di
     path
         A raw image, or a stack of them.
     pages
-        Of a stack: one, such as "3", some as "3:9" or "3-9", both of which count, or "all".
+        Pages of a stack: one, such as "3", some as "3:9" or "3-9", both of which count, or "all".
     one
-        Whether a single page is needed, as an error then says.
+        True if a single page is needed, as an error then says.
 
     Raises
     ------
@@ -199,11 +199,11 @@ def sharp_kinds(
     Parameters
     ----------
     calibration
-        Of the camera.
+        Calibration of the camera.
     patches
-        What its description says; none without one.
+        Patches of the camera's description; none without one.
     file
-        Of the calibration: that of a maker of multi-focus cameras (.xml) says it, too.
+        File of the calibration: that of a maker of multi-focus cameras (.xml) says it, too.
     """
     if calibration.lattice.kinds == 1:
         return None

@@ -46,15 +46,15 @@ def prepare(
     Parameters
     ----------
     raw
-        As it was read (y, x[, c]).
+        Raw image as it was read (y, x[, c]).
     calibration
-        Where the micro-images stand.
+        Calibration of the micro-images.
     white
         Picture of an evenly lit surface with the same settings.
     dark
         Picture with the lens covered: shows which pixels shine by themselves, too.
     camera
-        Its description: gives lengths, and the lattice where nothing else does; one without lenslets is
+        Camera description: gives lengths, and the lattice where nothing else does; one without lenslets is
         not looked at.
     mask
         Pixels to use (y, x), true or false; None for all.
@@ -108,7 +108,7 @@ def prepare(
 def _placed(
     raw: RawImage, calibration: Calibration | None, white: RawImage | None, camera: Described | None
 ) -> tuple[Calibration | None, list[str]]:
-    """Where the micro-images stand, by whom, and whether raw image and camera agree."""
+    """Calibration of the micro-images, and notes on its source and on whether it agrees with the camera."""
     told = None if camera is None else camera.calibration
     if calibration is not None:
         found, notes = calibration, ["the lattice is that of the calibration"]
@@ -181,7 +181,7 @@ def _pictured(raw: RawImage, beside: Beside) -> tuple[RawImage, np.ndarray | Non
 
 
 def _modelled(raw: RawImage, beside: Beside, found: Calibration | None) -> dict[str, Any]:
-    """What the model of a deconvolution takes of the dark and the white image."""
+    """Background and response that the model of a deconvolution takes from dark and white image."""
     dark = None if beside.dark is None else np.asarray(to_numpy(beside.dark.data), np.float64)
     if beside.white is None or found is None:
         return {"background": dark}
@@ -191,7 +191,7 @@ def _modelled(raw: RawImage, beside: Beside, found: Calibration | None) -> dict[
 
 
 def _counted(reasons: np.ndarray, lenslets: Verdicts | None) -> tuple[str, ...]:
-    """How many pixels and lenslets do not count, by reason, and how many lenslets are left out in all."""
+    """Numbers of pixels and lenslets that do not count, by reason, and of all lenslets left out."""
     told = []
     for reason in Reason:
         pixels = int((reasons == reason).sum())
@@ -210,7 +210,7 @@ class OfRaw(Protocol[Options, Seen]):
         self, raw: RawImage | Array, calibration: Calibration | None = None,
         *args: Options.args, **options: Options.kwargs,
     ) -> Seen:  # fmt: skip
-        """What the function gives for the raw image."""
+        """Result of the function for the raw image."""
         ...
 
 

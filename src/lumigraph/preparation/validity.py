@@ -1,4 +1,4 @@
-"""Which pixels and lenslets of a raw image count, judged by their light: `pixel_reasons`, `verdicts`."""
+"""Valid pixels and lenslets of a raw image, judged by their light: `pixel_reasons`, `verdicts`."""
 
 import math
 
@@ -27,11 +27,11 @@ def pixel_reasons(
     Parameters
     ----------
     raw
-        As it was read.
+        Raw image as it was read.
     beside
-        Its white image shows what is dark, its dark image what is dead.
+        Dark and white image: the white one shows what is dark, the dark one what is dead.
     calibration
-        Where the micro-images stand, if that is known.
+        Calibration of the micro-images, if it is known.
     mask
         Pixels to use (y, x), true or false.
     """

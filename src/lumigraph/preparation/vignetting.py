@@ -1,4 +1,4 @@
-"""How much light reaches each micro-image."""
+"""Vignetting: how much light reaches each micro-image."""
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -19,7 +19,7 @@ def vignetting(white: np.ndarray, pitch: float) -> np.ndarray:
     white
         White image above its dark (y, x).
     pitch
-        Of the micro-images [px].
+        Pitch of the micro-images [px].
 
     Raises
     ------

@@ -8,7 +8,7 @@
 - `sampling`: validity ranges and sampling rules, in closed form
 - `dropped`: what a band limit's dropped frequencies would have brought
 - `window`: the window of a calculation: size, quick FFT sizes, memory
-- `pruned`: convolution without the transforms that see only zeros
+- `pruned`: convolution without the transforms of zeros
 - `cache`: transfer functions that were built before
 """
 

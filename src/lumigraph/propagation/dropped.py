@@ -1,4 +1,4 @@
-"""What the frequencies that a band-limited propagation drops would have brought to its output."""
+"""Light in the output that a band-limited propagation loses with the frequencies it drops."""
 
 import math
 
@@ -9,7 +9,7 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 
 FEWEST_FREQUENCIES = 100
-"""With fewer in the band, "auto" takes zoom: band-limited has 51 dB with 158 of them, 45 dB with 63."""
+"""Least frequencies in the band, else "auto" takes zoom: band-limited has 51 dB by 158, 45 dB by 63."""
 LARGEST_ERROR = 1e-2
 """Relative rms error that is let pass."""
 DARK = 1e-10
@@ -20,7 +20,7 @@ _NEAR = 0.9 + 0.1 * np.sqrt((np.arange(7) + 0.5) / 7)  # of the limit; uneven, t
 def dropped_light(
     method: str, window: Grid, limits: tuple[float, float], fields: tuple[Field, Grid, Array], distance: float
 ) -> str | None:
-    r"""What is wrong where light of dropped frequencies belongs to the output.
+    r"""Warning text if frequencies that were dropped carry light of the output; else None.
 
     The band's end acts as an edge in the spectrum: along x it adds a wave from x_e = x_0 + λ z f_max,
 
@@ -34,9 +34,9 @@ def dropped_light(
     Parameters
     ----------
     method
-        Its name.
+        Name of the method.
     window
-        Of the calculation.
+        Window of the calculation.
     limits
         Highest frequencies (y, x) that are kept [1/m].
     fields

@@ -37,7 +37,7 @@ class Halves:
 
     @classmethod
     def of(cls, axes: tuple[np.ndarray, np.ndarray], pitch: float, area: float, like: np.ndarray) -> "Halves":
-        """To evenly spaced points, from others `pitch` apart [m], λz [m²]; in the precision of an array."""
+        """Factors for evenly spaced points, from others `pitch` apart [m], λz [m²]; precision of `like`."""
         there, here = axes
         middles = (there[0] + there[-1]) / 2, (here[0] + here[-1]) / 2
         u, x, off = there - middles[0], here - middles[1], middles[0] - middles[1]
@@ -52,7 +52,7 @@ class Halves:
 
     @property
     def nbytes(self) -> int:
-        """Of all four."""
+        """Memory of all four arrays [bytes]."""
         return self.before.nbytes + self.after.nbytes + self.cosine.nbytes + self.sine.nbytes
 
     def down(self, data: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Convolution by a band-limited transfer function, without the transforms that see only zeros.
+"""Convolution by a band-limited transfer function, without the transforms of zeros.
 
 Of a padded window only the input's own rows are transformed along x, only the columns inside the band
 along y, and only the rows that are asked for back along x; where every second sample is asked for and the
@@ -49,12 +49,12 @@ class Band:
 
     @property
     def parts(self) -> tuple[slice, slice]:
-        """Where they stand among all n."""
+        """Slices of the passing frequencies among all n."""
         return slice(self.positive), slice(self.n - self.negative, self.n)
 
     @property
     def packed(self) -> tuple[slice, slice]:
-        """Where they stand among those that pass."""
+        """Slices of the positive and negative frequencies among those that pass."""
         return slice(self.positive), slice(self.positive, self.count)
 
     def take(self, values: np.ndarray) -> np.ndarray:
@@ -62,7 +62,7 @@ class Band:
         return np.concatenate([values[..., : self.positive], values[..., self.n - self.negative :]], -1)
 
     def fewer(self, step: int) -> int:
-        """How many times shorter a DFT may be that gives every `step`-th sample: a divisor of it."""
+        """Factor by which a DFT that returns every `step`-th sample may be shorter: a divisor of `step`."""
         return max(k for k in range(1, step + 1) if step % k == 0 and self.count * k <= self.n)
 
     def thinned(self, step: int) -> "Band":
@@ -88,7 +88,7 @@ class Transfer:
         return self.rows.thinned(self.step[0]), self.columns.thinned(self.step[1])
 
     def kept(self, shape: tuple[int, ...]) -> list[slice]:
-        """What of those transforms makes an output of the given shape."""
+        """Slices of those transforms that make up an output of the given shape."""
         bands = zip((self.rows, self.columns), self.step, shape, strict=True)
         steps = [(step // band.fewer(step), n) for band, step, n in bands]
         return [slice(0, n * step, step) for step, n in steps]

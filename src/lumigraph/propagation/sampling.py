@@ -1,4 +1,4 @@
-"""How far each method is valid on a grid, and how fine a grid must be: closed forms with their sources.
+"""Range of validity of each method on a grid, and the grid it needs: closed forms with their sources.
 
 All functions take and return SI floats; pairs are (y, x). The rules for propagation windows and lenses
 are in Voelz, *Computational Fourier Optics*, SPIE 2011, chapters 5 and 6; the band limits in Matsushima
@@ -124,7 +124,7 @@ def smallest_window(input_diameter: float, output_diameter: float) -> float:
     Parameters
     ----------
     input_diameter, output_diameter
-        Of the light and of what is looked at, 2 r_in and 2 r_out [m].
+        Diameters of the light and of what is looked at, 2 r_in and 2 r_out [m].
     """
     return input_diameter + output_diameter
 
@@ -166,7 +166,7 @@ def intensity_pitch(f_number: float, wavelength: float) -> float:
 
 
 def one_step_aliases(grid: Grid, distance: float, wavelength: float) -> str | None:
-    """What is wrong where the chirp of a one-step Fresnel transform aliases on the input grid."""
+    """Warning text if the chirp of a one-step Fresnel transform aliases on the input grid; else None."""
     shortest = shortest_distance(grid, wavelength)
     if abs(distance) >= shortest * (1 - 1e-9):
         return None
@@ -177,7 +177,7 @@ def one_step_aliases(grid: Grid, distance: float, wavelength: float) -> str | No
 
 
 def points_alias(pitch: float, farthest: float, distance: float, wavelength: float) -> str | None:
-    """What is wrong where neighbouring input samples differ by more than half a wave at the output."""
+    """Warning text if neighbouring inputs differ by over half a wave at the output; else None."""
     widest = wavelength * abs(distance) / (2 * pitch)
     if farthest <= widest * (1 + 1e-9):
         return None
@@ -189,7 +189,7 @@ def points_alias(pitch: float, farthest: float, distance: float, wavelength: flo
 
 
 def unlimited_aliases(method: str, window: Grid, distance: float, wavelength: float) -> str | None:
-    """What is wrong where a transfer function without band limit aliases on its window.
+    """Warning text if a transfer function without band limit aliases on its window; else None.
 
     An axis of one sample holds only the frequency 0, which never aliases.
     """
@@ -204,7 +204,7 @@ def unlimited_aliases(method: str, window: Grid, distance: float, wavelength: fl
 
 
 def kept_alias(method: str, limits: Pair, window: Grid, distance: float, wavelength: float) -> str | None:
-    """What is wrong where a method keeps frequencies (y, x) that alias on its window."""
+    """Warning text if a method keeps frequencies (y, x) that alias on its window; else None."""
     free = band_limits(window, distance, wavelength)
     for limit, clean, pitch in zip(limits, free, window.pitch, strict=True):
         if min(limit, 0.5 / pitch) > 1.01 * clean:
@@ -218,14 +218,14 @@ def kept_alias(method: str, limits: Pair, window: Grid, distance: float, wavelen
 def light_wraps(
     window: Grid, limits: Pair, farthest: tuple[int, int], distance: float, wavelength: float
 ) -> str | None:
-    """What is wrong where light that leaves the window comes back deep into the output.
+    """Warning text if light that leaves the window comes back deep into the output; else None.
 
     Up to a quarter of the window is let pass: most fields have an empty border.
 
     Parameters
     ----------
     window
-        Of the calculation.
+        Window of the calculation.
     limits
         Highest frequencies (y, x) that are kept [1/m].
     farthest

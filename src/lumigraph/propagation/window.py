@@ -84,7 +84,7 @@ def window_shape(
     first
         Index of the output's first sample, counted from the input's first.
     multiples
-        What must divide the numbers.
+        Divisors of the numbers.
 
     Raises
     ------

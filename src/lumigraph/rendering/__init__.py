@@ -1,17 +1,11 @@
-"""From raw images to pictures.
+"""Pictures and light fields from raw images.
 
-- `decode`: a plenoptic 1.0 raw image to a `LightField`, on its true micro-image lattice; `encode` back;
-  `squared`: hexagonal lattices onto a square grid, and finer; `pixels`: hot pixels found and filled;
-  `kind_check`: recognises a raw image of a camera 2.0
-- `views`: single views, points of view, a smaller aperture, mosaics of views and of micro-images;
-  `paths`: a point of view that moves
-- `focus_range`: refocus factors worth looking at
-- `refocus`: shear and sum, for one depth or a stack; `sharp`: one picture focused everywhere
-- `fourier_slice`: the same by a slice through the four-dimensional spectrum
-- `focused`: plenoptic 2.0: turned patches tiled without seams, of one size or one for each lenslet;
-  `patches`: their sizes; `kinds`: which lenslets are sharp; `super_resolution`: finer than one of them
-- `geometry`: lengths in metres, which lenslets form a rectangle
-- `interpolate`: values between samples, by gathering and weights, for every array library
+- `decode`, `encode`: plenoptic 1.0 raw images to a `LightField` on their lattice, and back; `squared`,
+  `pixels`, `kind_check`: hexagonal lattices onto a square grid, hot pixels, raw images of a camera 2.0
+- `views`, `paths`: views, points of view, apertures, mosaics; a point of view that moves
+- `refocus`, `fourier_slice`, `sharp`, `focus_range`: refocused pictures; one that is focused everywhere
+- `focused`, `patches`, `kinds`, `super_resolution`: plenoptic 2.0 pictures, of patches of one size or many
+- `geometry`, `interpolate`: lengths in metres, rectangles of lenslets; values between samples
 """
 
 from lumigraph.rendering.decode import decode

@@ -132,7 +132,7 @@ def _without_dark(ready: PreparedImage, calibration: Calibration) -> Calibration
 
 @dataclass(frozen=True, slots=True)
 class _How:
-    """What the user chose."""
+    """Options of a decoding, as the user chose them."""
 
     directions: int | tuple[int, int] | None
     samples: int
@@ -176,7 +176,7 @@ def check_raw(raw: RawImage, calibration: Calibration) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Directions:
-    """How micro-images are sampled: `count` views (v, u), `step` pixels apart."""
+    """Sampling of micro-images: `count` views (v, u), `step` pixels apart."""
 
     count: tuple[int, int]
     step: tuple[float, float]
@@ -190,7 +190,7 @@ class _Directions:
         if max(nv, nu) > MOST_DIRECTIONS:
             raise CalibrationError(
                 f"directions is ({nv}, {nu}) but micro-images of {calibration.lattice.pitch:.1f} px hold no "
-                f"more than {MOST_DIRECTIONS} on either axis. Ask for as many as they have pixels."
+                f"more than {MOST_DIRECTIONS} on either axis. Use as many as they have pixels."
             )
         first, second = calibration.lattice.pitches
         return cls((nv, nu), (first / nv, second / nu))
@@ -203,7 +203,7 @@ class _Directions:
         return -(np.arange(n)[:, None] - n // 2 + within) * step
 
     def reach(self, frame: Frame) -> tuple[tuple[float, float], tuple[float, float]]:
-        """What a micro-image needs before and after its centre (y, x) [px], turned lattices included."""
+        """Margins that a micro-image needs before and after its centre (y, x) [px], also if turned."""
         across, along = self.offsets(0), self.offsets(1)
         corners = [(v, u) for v in (across.min(), across.max()) for u in (along.min(), along.max())]
         ends = [v * frame.column + u * frame.row for v, u in corners]
@@ -246,7 +246,7 @@ def _row_spacing(calibration: Calibration, frame: Frame) -> float:
 
 
 def _lenslet_grid(calibration: Calibration, frame: Frame, indices: np.ndarray, squared: Squared) -> Grid:
-    """Where the samples of views stand, along the lattice's own axes."""
+    """Grid of the samples of views, along the lattice's own axes."""
     lattice, shape = calibration.lattice, (len(squared.t), len(squared.s))
     t, s = squared.t[shape[0] // 2], squared.s[shape[1] // 2]
     i, j = (int(k) for k in indices[0, 0])

@@ -1,4 +1,4 @@
-"""Which refocus factors are worth looking at."""
+"""Useful range of refocus factors."""
 
 from lumigraph.core.lightfield import LightField
 

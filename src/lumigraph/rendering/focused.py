@@ -146,7 +146,7 @@ def render_stack(
 
 
 def rendered_grid(calibration: Calibration, patch: float | Array, samples: int | None = None) -> Grid:
-    """Where the samples of a rendered picture lie in the main image [m].
+    """Grid of the samples of a rendered picture in the main image [m].
 
     X = c z2 / L, with z2 / L from the patch: 1 - a/L, and a = b / (m z2/L + b/L). Where the calibration's
     pixel pitch, separation L or lenslet distance b is unknown, one lenslet's tile is 1.
@@ -181,7 +181,7 @@ def rendered_grid(calibration: Calibration, patch: float | Array, samples: int |
 
 
 def sight_grid(calibration: Calibration, patch: float | Array, samples: int | None = None) -> Grid:
-    """Where the lenslets are met by the rays from the middle of the main lens to a picture's samples [m].
+    """Grid of the crossings of lenslets by rays from the middle of the main lens to a picture's samples.
 
     Each sample lies somewhere on its ray, at the depth that its own patch says.
 
@@ -235,7 +235,7 @@ _Places = Iterator[tuple[tuple[np.ndarray, np.ndarray], np.ndarray | None]]
 
 @dataclass(frozen=True, slots=True)
 class _Source:
-    """Where on the sensor each sample of the picture is seen, and with what weight."""
+    """Places on the sensor that show each sample of the picture, and their weights."""
 
     calibration: Calibration
     sizes: Patches

@@ -88,7 +88,7 @@ def transposed(calibration: Calibration) -> Calibration | None:
 
 
 def lit(data: Array) -> np.ndarray:
-    """Which views (v, u) are not dark everywhere: those inside a round or hexagonal aperture."""
+    """Mask (v, u) of views that are not dark everywhere: those inside a round or hexagonal aperture."""
     xp = namespace(data)
     return to_numpy(xp.any(data != 0, axis=tuple(range(2, data.ndim))))
 
@@ -155,7 +155,7 @@ def _none_whole(calibration: Calibration) -> CalibrationError:
 def raw_places(
     views: LightField, calibration: Calibration, samples: np.ndarray, which: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where samples of views come from on the raw image (y, x) [px].
+    """Places (y, x) of samples of views on the raw image [px].
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether a raw image is one of a plenoptic camera 2.0, whose micro-images are sharp pictures."""
+"""Recognition of raw images of a plenoptic camera 2.0, whose micro-images are sharp pictures."""
 
 import math
 import warnings
@@ -87,7 +87,7 @@ def _pairs(picture: np.ndarray, calibration: Calibration) -> tuple[np.ndarray, n
 
 
 def _shift(first: np.ndarray, second: np.ndarray, calibration: Calibration) -> tuple[float, float]:
-    """How far details move along the row from one piece (k, n, n) to the next [px], and their correlation."""
+    """Shift of details along the row from one piece (k, n, n) to the next [px], and their correlation."""
     size, pitch = first.shape[-1], calibration.lattice.pitch
     shape = (2 * size, 2 * size)
 

@@ -1,4 +1,4 @@
-"""Which kind of lenslets of a multi-focus array is sharp at which patch, by the raw image itself."""
+"""Kinds of lenslets of a multi-focus array, matched with their sharp patches by the raw image itself."""
 
 from collections.abc import Sequence
 from itertools import permutations
@@ -41,7 +41,7 @@ def match_kinds(
     Raises
     ------
     GeometryError
-        A lattice of one kind, a map of another shape, or patches that cannot be.
+        A lattice of one kind, a map of another shape, or impossible patches.
     """
     raw = raw if isinstance(raw, RawImage) else RawImage(raw)
     check_raw(raw, calibration)

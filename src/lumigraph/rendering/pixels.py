@@ -13,7 +13,7 @@ _LEAST_CONTRAST = 4.0  # a hot pixel is as many times brighter than its neighbou
 
 
 def hot_pixels(raw: RawImage | Array, *, dark: RawImage | Array | None = None, sigmas: float = 8.0) -> Array:
-    """Which pixels (y, x) of a raw image shine by themselves: true or false, for ``decode(bad=...)``.
+    """Mask (y, x) of hot pixels in a raw image, for ``decode(bad=...)``.
 
     With a dark image, those that stand out of it by `sigmas` robust standard deviations; without, single
     pixels of the raw image that do so over the median of their eight neighbours (of their own colour, where

@@ -119,7 +119,7 @@ def refocus_stack(
 
 
 def shifts(views: LightField, alpha: float) -> tuple[np.ndarray, np.ndarray]:
-    """How far each view is moved along t (nv,) and s (nu,) [lenslets] to focus on alpha."""
+    """Shifts of each view along t (nv,) and s (nu,) [lenslets] to focus on alpha."""
     grids = views.aperture, views.lenslets
     return (
         grids[0].y * (1 - alpha) / grids[1].pitch[0],
@@ -143,7 +143,7 @@ def _inverse(seen: np.ndarray) -> np.ndarray:
 
 
 _Taps = list[tuple[int, float]]
-"""By how many samples a neighbour stands off, and its weight."""
+"""Offset of a neighbour in samples, and its weight."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +177,7 @@ class _Axis:
 
 @dataclass(frozen=True, slots=True)
 class _Plane:
-    """How views are moved for one picture: along t and along s."""
+    """Shifts of views for one picture: along t and along s."""
 
     t: _Axis
     s: _Axis
@@ -191,7 +191,7 @@ class _Plane:
         )
 
     def seen(self, open_views: np.ndarray) -> np.ndarray:
-        """How many views see each place of the picture (t, s)."""
+        """Number of views that see each place of the picture (t, s)."""
         return self.t.seen().T @ open_views @ self.s.seen()
 
 

@@ -177,7 +177,7 @@ def _some_grey(views: LightField) -> tuple[list[np.ndarray], list[tuple[int, int
 
 
 def _some(used: np.ndarray) -> np.ndarray:
-    """Up to so many indices of views, the first and the last among them."""
+    """Indices of at most so many views, the first and the last among them."""
     first, last = (int(k) for k in np.flatnonzero(used)[[0, -1]]) if used.any() else (0, 0)
     return np.unique(np.linspace(first, last, _MOST_VIEWS).astype(int))
 

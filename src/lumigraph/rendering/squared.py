@@ -1,4 +1,4 @@
-"""Views of lenslets in rows, square or hexagonal, to samples on a square grid, as fine as asked for."""
+"""Resampling of views of lenslets in rows, square or hexagonal, to a square grid of any fineness."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from lumigraph.rendering.interpolate import Interpolation, neighbours, take
 
 @dataclass(frozen=True, slots=True)
 class Squared:
-    """Where the samples of views stand between the lenslets of a rectangle.
+    """Places of the samples of views between the lenslets of a rectangle.
 
     Of a square lattice, `samples` per lenslet along both axes, the first on the first lenslet. Of a
     hexagonal lattice the rows stay as they are, √3/2 of a pitch apart, and each is sampled once along itself
@@ -36,7 +36,7 @@ class Squared:
 
     @property
     def is_plain(self) -> bool:
-        """Whether every sample stands on a lenslet."""
+        """True if every sample stands on a lenslet."""
         on_lenslets = bool(np.all(self.t % 1 == 0) and np.all(self.s % 1 == 0))
         return on_lenslets and not self.odd.any() and len(self.t) == len(self.odd)
 

@@ -132,7 +132,7 @@ def _warn_if_alike(calibration: Calibration, sizes: Patches, factor: int) -> Non
 
 
 def _projection(calibration: Calibration, sizes: Patches, layout: Layout) -> tuple[Matrix, np.ndarray]:
-    """From a picture to means over the pixels' widths (pixels,), and the flat indices of those pixels."""
+    """Matrix from a picture to means over the pixels' widths (pixels,), and those pixels' flat indices."""
     lattice, (ny, nx) = calibration.lattice, calibration.shape
     y, x = np.meshgrid(np.arange(ny, dtype=float), np.arange(nx, dtype=float), indexing="ij")
     i, j = calibration.index(y, x)

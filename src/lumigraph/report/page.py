@@ -120,7 +120,7 @@ class Page:
 
     @property
     def framed(self) -> bool:
-        """Whether the page shows another."""
+        """True if the page shows another."""
         return any(isinstance(part, Frame) for section in self.sections for part in section.parts)
 
     def section(self, title: str, *, folded: bool = False) -> Section:

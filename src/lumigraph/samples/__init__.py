@@ -6,7 +6,7 @@
   which shine through one another, for microscopes
 - `bench`: white and raw image of a plenoptic camera (1.0 or 2.0), with camera, scene and depths
 - `volume`: raw image of a light-field microscope, with the volume that it shows
-- `drawn`: scenes drawn by chance, as a camera sees them; `dataset`: many of them in one store
+- `drawn`: randomly drawn scenes before a camera; `dataset`: many of them in one store
 - `files`: their camera files, and a lens' prescription; `folder`: all of them as files
 """
 

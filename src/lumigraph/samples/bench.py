@@ -15,17 +15,17 @@ from lumigraph.simulation import Incoherent, simulate
 from lumigraph.units import mm
 
 DEPTHS = {"plenoptic": (-14 * mm, 0.0, 18 * mm), "focused-plenoptic": (-4 * mm, 0.0, 5 * mm)}
-"""Of the near, the middle and the far target, from the focused plane [m]."""
+"""Depths of the near, the middle and the far target, from the focused plane [m]."""
 
 ACCURACY = 2e-3
-"""Of the images: parabolic lenslets as fast as these, f/35, are off by 1.1e-3; noise is more."""
+"""Accuracy of the images: parabolic lenslets as fast as these, f/35, are off by 1.1e-3; noise is more."""
 
 _CLASSES = {"plenoptic": PlenopticCamera, "focused-plenoptic": FocusedPlenopticCamera}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BenchSample:
-    """What a camera recorded, and what stood before it.
+    """Recording of a camera, and the scene that stood before it.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class BenchSample:
     scene
         A fine star in front (left), a USAF-1951 chart in focus (middle), a coarse star behind (right).
     depths
-        Of the three, from the focused plane [m], positive farther.
+        Depths of the three, from the focused plane [m], positive farther.
     white, raw
         Images of a diffuser and of the scene, with photon and read noise.
     """
@@ -47,7 +47,7 @@ class BenchSample:
 
 
 def bench(kind: str = "plenoptic", *, seed: int = 1, progress: Progress | None = None) -> BenchSample:
-    """Simulated pictures of a small plenoptic camera on a bench: what to calibrate, decode and refocus.
+    """Simulated pictures of a small plenoptic camera on a bench, to calibrate, decode and refocus.
 
     Wave optics, incoherent light; some ten seconds on two cores.
 
@@ -56,7 +56,7 @@ def bench(kind: str = "plenoptic", *, seed: int = 1, progress: Progress | None =
     kind
         "plenoptic" (1.0) or "focused-plenoptic" (2.0).
     seed
-        Of the sensor's noise.
+        Seed of the sensor's noise.
     progress
         Called as ``progress(fraction)``, a `core.progress.Stage`.
 

@@ -36,17 +36,17 @@ class Draws:
     cameras
         Camera files' texts, with their kinds; sample n is taken by camera n modulo their count.
     depths
-        Of the scenes' planes from the focused plane [m].
+        Depths of the scenes' planes from the focused plane [m].
     layouts
-        Of `LAYOUTS`.
+        Layouts, of `LAYOUTS`.
     photographs
         Files whose parts become textures.
     seed
-        Of all that is drawn.
+        Seed of all random values.
     accuracy
-        Of the raw images before noise, relative rms.
+        Error of the raw images before noise, relative rms.
     volume
-        Whether the intensities of all planes are kept, too.
+        True to keep the intensities of all planes, too.
     """
 
     cameras: tuple[str, ...]
@@ -92,7 +92,7 @@ def _pictures(files: tuple[str, ...]) -> Sequence[np.ndarray]:
 
 
 def card(work: Draws, count: int, layout: Mapping[str, Any], command: str) -> str:
-    """What a data set is, in Markdown: arrays, numbers of what was drawn, cameras, how it was made."""
+    """Description of a data set in Markdown: arrays, ranges of what was drawn, cameras, how it was made."""
     about = {
         "raw": "what the sensor read, with photon and read noise [DN]",
         "picture": "the scene with all planes in focus, 0 to 1",
@@ -130,7 +130,7 @@ def dataset(
     Parameters
     ----------
     work
-        What is drawn.
+        Description of what is drawn.
     count
         Samples.
     output
@@ -138,7 +138,7 @@ def dataset(
     workers, part, progress, estimated
         As `cluster.batch` takes them.
     command
-        For the card.
+        Command line for the card.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Scenes drawn by chance before a camera, with the truth: what learned methods are trained and tested on."""
+"""Randomly drawn scenes before a camera, with the truth, to train and test learned methods."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ LAYOUTS = ("patches", "slanted", "beads")
 """Patches at depths of their own, side by side; one slanted plane, in steps; beads in a dark volume."""
 
 TEXTURES = ("noise", "blobs", "stripes", "photograph")
-"""Of patches and planes; photographs where some are given."""
+"""Textures of patches and planes; photographs where some are given."""
 
 FILLS = (0.3, 0.9)
 """Part of a full well that the brightest pixel fills, from and to."""
@@ -35,11 +35,11 @@ class DrawnSample:
     raw
         The exposure.
     intensity
-        What stood there (z, y, x), float32 from 0 to 1.
+        Intensity of the scene's planes (z, y, x), float32 from 0 to 1.
     depth
-        Of each place (y, x) from the focused plane [m]; None of beads, which have no single one.
+        Depth of each place (y, x) from the focused plane [m]; None of beads, which have no single one.
     drawn
-        What was drawn, by name.
+        Random values, by name.
     """
 
     raw: RawImage
@@ -61,7 +61,7 @@ def drawn(
     layouts: Sequence[str] = LAYOUTS[:2],
     photographs: Sequence[np.ndarray] = (),
 ) -> DrawnSample:
-    """One scene drawn by chance, as a camera sees it, with photon and read noise.
+    """One randomly drawn scene before a camera, with photon and read noise.
 
     Light adds up: where patches meet, the near one hides nothing of what is behind it.
 
@@ -72,9 +72,9 @@ def drawn(
     sensor
         ``camera.sensor``.
     rng
-        Where chance comes from: the same state draws the same sample.
+        Source of random numbers: the same state draws the same sample.
     layouts
-        Of `LAYOUTS`; one of them is drawn.
+        Layouts, of `LAYOUTS`; one of them is drawn.
     photographs
         (y, x) or (y, x, c), of which parts become textures, in grey.
 

@@ -15,7 +15,7 @@ from lumigraph.samples.scene import scene
 from lumigraph.samples.volume import volume
 
 NAMES = ("scene", "bench", "volume")
-"""What can be written."""
+"""Names of the samples."""
 
 
 def write(
@@ -32,7 +32,7 @@ def write(
     folder
         Made when it is missing.
     names
-        Of `NAMES`.
+        Names, of `NAMES`.
     size
         Samples (t, s) of each view of the scene.
     progress

@@ -33,7 +33,7 @@ _LUMINANCE = np.array((0.2126, 0.7152, 0.0722), np.float32)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PortraitSample:
-    """What a plenoptic camera records of the painted scene.
+    """Recording of the painted scene by a plenoptic camera.
 
     Parameters
     ----------
@@ -121,9 +121,9 @@ def glowing(grid: Grid, depth: float) -> Scene:
     Parameters
     ----------
     grid
-        Their samples [m].
+        Grid of their samples [m].
     depth
-        Of the leaves before and of the wall behind the focused plane [m].
+        Depths of the leaves before and of the wall behind the focused plane [m].
 
     Examples
     --------
@@ -142,7 +142,7 @@ def glowing(grid: Grid, depth: float) -> Scene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rays:
-    """Where light on the sensor comes from: through which place of the main lens, from where in focus."""
+    """Rays that reach the sensor: their places in the main lens and in the focused plane."""
 
     camera: Plenoptic
     inside: np.ndarray  # (rows, columns) of lenslets that there are, from the index `first`
@@ -159,7 +159,7 @@ class _Rays:
         return cls(camera, inside, first, 2 * reach * camera.object_distance / camera.separation)
 
     def through(self, y: np.ndarray, x: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
-        """For pixels at (y, x): (y, x) in focus [heights], (v, u) on the main lens [diameters], whether lit.
+        """Rays to pixels (y, x): (y, x) in focus [heights], (v, u) on the main lens [diameters], whether lit.
 
         Once for each place on a lenslet. The raw image is turned by 180°, which is turned back here.
         """
@@ -242,7 +242,7 @@ class _Painted:
 
 
 def _depth(camera: Plenoptic) -> float:
-    """From the focused plane to the nearest and the farthest layer [m], to first order."""
+    """Distance from the focused plane to the nearest and the farthest layer [m], to first order."""
     f_number = camera.object_distance / camera.pupil_diameter
     depth = _DEPTHS * resolution.depth_of_field(camera.wavelength, f_number)
     if isinstance(camera, Rendered):
@@ -260,7 +260,7 @@ def _aspect(camera: Plenoptic) -> float:
 
 
 def _composed(layers: list[_Painted], y: Any, x: Any, v: Any, u: Any) -> np.ndarray:
-    """What rays see, from the back to the front."""
+    """Colours along rays, layers composed from back to front."""
     total = np.zeros(y.shape, np.float32)
     for layer in layers:
         light, cover = layer.seen(y, x, v, u)

@@ -27,12 +27,12 @@ BLADES = (
     (0.46, -0.10, 0.16, 0.020),
     (0.68, 0.02, -0.35, 0.026),
 )
-"""Of each leaf: x of the root, how far the tip leans over, y of the tip, half width."""
+"""Shape of each leaf: x of the root, how far the tip leans over, y of the tip, half width."""
 
 
 @dataclass(frozen=True, slots=True)
 class Canvas:
-    """What one layer adds to a picture, and where.
+    """Picture of one layer, and its place.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Layer:
     paint
         Paints it on a canvas, as seen from the middle view.
     parallax
-        How far it moves from the first view to the last [heights]; positive is nearer.
+        Displacement from the first view to the last [heights]; positive is nearer.
     slant
         Change of the parallax for each height downwards.
     """
@@ -210,4 +210,4 @@ LAYERS = (
     Layer(_robot, 0.012),
     Layer(_leaves, 0.085),
 )
-"""From the back to the front; each hides what is behind it. The robot stands on the table."""
+"""Layers from the back to the front; each hides what is behind it. The robot stands on the table."""

@@ -17,14 +17,14 @@ ACCURACY = 1e-2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VolumeSample:
-    """What a microscope recorded, and what was there.
+    """Recording of a microscope, and the volume that it shows.
 
     Parameters
     ----------
     camera
         20x/0.5, lenslets of 125 um.
     samples_per_lenslet
-        Of the volume, for ``camera.operator(volume.depths, samples_per_lenslet, accuracy=1e-2)``.
+        Samples of the volume, for ``camera.operator(volume.depths, samples_per_lenslet, accuracy=1e-2)``.
     volume
         Truth (z, y, x) [photons].
     raw
@@ -47,7 +47,7 @@ def volume(photons: float = 200.0, *, seed: int = 1) -> VolumeSample:
     photons
         Brightness of the shell; less of it is noisier.
     seed
-        Of the noise.
+        Seed of the noise.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What stands in front of the camera, in object space.
+"""Scenes in front of the camera, in object space.
 
 - `volumes`: `Scene` and its parts: `Slice`, `Points`, `Diffuser`
 - `targets`: test charts as scenes: pinhole, edge, USAF-1951, gratings, star, chessboard, photo

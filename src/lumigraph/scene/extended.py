@@ -66,7 +66,7 @@ class ExtendedSource:
     Parameters
     ----------
     lamp
-        Its shape.
+        Shape of the lamp.
     distance
         z from the source to the plane [m]; infinity for collimated light, negative for light that converges
         to an image of the source behind the plane, such as a condenser's in the main lens.
@@ -175,7 +175,7 @@ class ExtendedSource:
         Warns
         -----
         SamplingWarning
-            Light that is steeper than the samples can tell.
+            Light that is steeper than the samples resolve.
         """
         light = self.sampled(grid, wavelength, distance, accuracy, dtype)
         nearer = self._at(distance)
@@ -187,7 +187,7 @@ class ExtendedSource:
     def sampled(
         self, grid: Grid, wavelength: float, distance: float, accuracy: float, dtype: Any
     ) -> CoherentModes:
-        """As `modes`, on a grid that may hold fewer directions, such as a slice that it shines through."""
+        """Modes as of `modes`, on a grid that may hold fewer directions, such as an illuminated slice."""
         lamps.check(grid, wavelength, accuracy)
         here = self._at(checks.finite("distance", distance))
         here._require(grid, wavelength, accuracy, np.dtype(dtype).itemsize)

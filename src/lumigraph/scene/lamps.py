@@ -119,7 +119,7 @@ class Picture:
         return float(np.count_nonzero(self.intensity)) * math.prod(self.sines.pitch)
 
     def transform(self, y: Any, x: Any) -> np.ndarray:
-        """That of the samples, times that of a pixel."""
+        """Fourier transform of the samples times that of a pixel."""
         y, x = np.broadcast_arrays(np.asarray(y, np.float64), np.asarray(x, np.float64))
         pixel = Rectangle((self.sines.pitch[0] / 2, self.sines.pitch[1] / 2)).transform(y, x)
         down, across = (

@@ -33,7 +33,7 @@ class SpectralLine:
     Parameters
     ----------
     wavelength
-        Of its middle, in vacuum [m].
+        Central wavelength, in vacuum [m].
     width
         Δλ, full width at half maximum [m].
     profile
@@ -121,7 +121,7 @@ class SpectralLine:
         path_difference
             The largest on the light's way that matters [m], as from lens to lenslets.
         accuracy
-            Of the degree of coherence over it; the sources' own errors are added to the result's ``error``.
+            Error of the degree of coherence over it; the sources' own ones are added to ``error``.
 
         Raises
         ------

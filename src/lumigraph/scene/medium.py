@@ -1,4 +1,4 @@
-"""What light of a sample goes through before it reaches the objective: slices that delay it."""
+"""Refracting samples: slices that delay light before it reaches the objective."""
 
 import math
 from collections.abc import Callable
@@ -17,10 +17,10 @@ from lumigraph.core.volume import Volume
 from lumigraph.errors import GeometryError
 
 STRAY = 1e-5
-"""Of the light, what may be bent farther than it is followed."""
+"""Part of the light that may be bent farther than is followed."""
 
 MOST_SAMPLES = 4096
-"""Along a side, of a path that is looked at to tell how far it bends light."""
+"""Samples along a side of a path that is examined for how much it bends light."""
 
 T = TypeVar("T")
 
@@ -37,10 +37,10 @@ class Medium:
     grid
         Where the samples of every slice stand [m]; beside it, the border's paths go on.
     depths
-        Of the slices from the focused plane (z,) [m], positive farther from the objective; in any order.
+        Depths from the focused plane (z,) [m], positive farther from the objective; in any order.
     slabs
-        Whether slices are slabs of an index that changes from one to the next, as `of_index` has them: then
-        simulations tell whether they stand near enough to each other.
+        True for slabs of an index that changes from one to the next, as `of_index` has them: then
+        simulations check that they are close enough to each other.
 
     Raises
     ------
@@ -85,7 +85,7 @@ class Medium:
 
     @classmethod
     def of_index(cls, difference: Volume[Any]) -> "Medium":
-        """Of a volume of refractive indices less the sample's even one: each plane stands for its slab.
+        """Medium of a volume of index differences from the sample's mean; each plane stands for its slab.
 
         Raises
         ------
@@ -110,7 +110,7 @@ class Medium:
         return replace(self, paths=self.paths[met], depths=tuple(self.depths[k] for k in met), _kept={})
 
     def coarser(self) -> "Medium":
-        """With neighbouring slices together, each pair halfway between: what tells how fine the steps are."""
+        """Medium with neighbouring slices merged in pairs, each pair halfway between: a test of the step."""
 
         def paired() -> Medium:
             pairs = [slice(k, k + 2) for k in range(0, len(self.depths), 2)]
@@ -121,7 +121,7 @@ class Medium:
         return self._remembered("coarser", paired)
 
     def finer(self) -> "Medium":
-        """With twice as many slices, between which paths go over evenly: what tells how near planes stand.
+        """Medium with twice as many slices, paths interpolated between: a test of the planes' spacing.
 
         Of slices that are given as such, and not of an index, themselves.
         """
@@ -140,7 +140,7 @@ class Medium:
         return self._remembered("finer", halved)
 
     def path(self, number: int, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Of a slice at places (y,), (x,) [m]: splines through its samples, which are made once (y, x)."""
+        """Optical path of a slice at (y,), (x,) [m]: splines through its samples, computed once (y, x)."""
 
         def spline() -> RectBivariateSpline:
             degree = min(3, *(n - 1 for n in self.grid.shape))
@@ -149,7 +149,7 @@ class Medium:
         return self._remembered(f"spline {number}", spline)(y, x)
 
     def bent(self, wavelength: float, slope: float) -> float:
-        """By how much all slices change n sin θ of light that leans by up to a slope.
+        """Change of n sin θ by all slices, for light inclined by up to a slope.
 
         All but `STRAY` of the light: it goes along straight lines, upright or leaning to four sides, and
         paths along these add up.
@@ -162,7 +162,7 @@ class Medium:
         return self._remembered(f"bent {wavelength} {slope}", found)
 
     def bent_once(self, wavelength: float) -> float:
-        """By how much a single slice changes n sin θ at most, of all but `STRAY` of the light."""
+        """Largest change of n sin θ by a single slice, for all but `STRAY` of the light."""
 
         def found() -> float:
             return max(self._spread(path, wavelength) for path in self.paths)

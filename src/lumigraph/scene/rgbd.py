@@ -16,12 +16,12 @@ MOST = 64
 """Slices."""
 
 BESIDE = 2.0
-"""How much farther than the main lens sees behind an edge a slice goes on [samples]."""
+"""Samples that a slice is continued beyond what the main lens sees behind an edge."""
 
 
 @runtime_checkable
 class Seeing(Protocol):
-    """What a scene has to know of the camera that will see it."""
+    """Protocol of the camera that a scene with hidden parts is made for."""
 
     @property
     def object_distance(self) -> float:
@@ -30,7 +30,7 @@ class Seeing(Protocol):
 
     @property
     def pupil_diameter(self) -> float:
-        """Of the main lens [m]."""
+        """Diameter of the main lens' stop [m]."""
         ...
 
 
@@ -101,7 +101,7 @@ def rgbd(
 def _distances(
     colours: np.ndarray, depths: np.ndarray, under: np.ndarray, grid: Grid, camera: Seeing
 ) -> np.ndarray:
-    """To the main lens (y, x) [m]."""
+    """Distances of the picture's samples to the main lens (y, x) [m]."""
     for name, shape in (("picture", colours.shape[:2]), ("depth", depths.shape), ("behind", under.shape[:2])):
         if shape != grid.shape:
             raise GeometryError(f"{name} has shape {shape} but the grid has {grid.shape}. Resample it.")
@@ -120,7 +120,7 @@ def _distances(
 def _going_on(
     number: np.ndarray, k: int, places: Sequence[float], grid: Grid, camera: Seeing
 ) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    """Where slice k is, behind nearer ones too, and whose colours are seen there."""
+    """Mask of slice k (y, x), continued behind nearer slices, and indices of the colours to use there."""
     found: Any = distance_transform_edt(number != k, sampling=grid.pitch, return_indices=True)
     away, sources = found
     parallax = camera.pupil_diameter / 2 * camera.object_distance * (np.array(places)[number] - places[k])

@@ -133,7 +133,7 @@ class GaussianSchell:
     def sampled(
         self, grid: Grid, wavelength: float, distance: float, accuracy: float, dtype: Any
     ) -> CoherentModes:
-        """As `modes`, on a grid that may be smaller than the light, such as a slice that it lights."""
+        """Modes as of `modes`, on a grid that may be smaller than the light, such as a lit slice."""
         check(grid, wavelength, accuracy)
         checks.finite("distance", distance)
         orders, weights, error = self._chosen(grid, accuracy, np.dtype(dtype).itemsize)
@@ -192,7 +192,7 @@ class GaussianSchell:
         )
 
     def _warn(self, grid: Grid, wavelength: float, distance: float, accuracy: float) -> None:
-        """Where light misses the window, or turns faster than samples can follow."""
+        """Warn if light misses the window, or oscillates too fast for the samples."""
         check(grid, wavelength, accuracy)
         widths, angles = self.width_after(distance, wavelength), self.divergence(wavelength)
         for axis, (name, size, pitch) in enumerate(zip("yx", grid.size, grid.pitch, strict=True)):
@@ -234,7 +234,7 @@ def _shares(fall: float, quality: float, accuracy: float) -> np.ndarray:
 
 
 def _left(reach: float) -> float:
-    """What modes leave out of second moments, whose light is above exp(-reach) of the brightest."""
+    """Part of the second moments lost without modes fainter than exp(-reach) of the brightest."""
     return math.exp(-reach) * (1 + reach + reach**2 / 2)
 
 

@@ -74,7 +74,7 @@ def point_source(
     distance
         z [m]; negative for a wave that converges to a point behind the grid, exp(-ikr) / r.
     position
-        Of the point (y0, x0) [m].
+        Position of the point (y0, x0) [m].
     dtype
         complex128 or complex64.
     paraxial
@@ -154,8 +154,8 @@ def warn_if_coarse(what: str, grid: Grid, wavelength: float, sines: Pair) -> Non
     for name, pitch, sine in zip("yx", grid.pitch, sines, strict=True):
         if sine * pitch > wavelength / 2 * (1 + 1e-9):
             warnings.warn(
-                f"{what} reaches sin θ = {sine:.4g} along {name} but samples every {pitch * 1e6:.4g} µm tell "
-                f"directions apart up to {wavelength / (2 * pitch):.4g}. Use a finer or smaller grid.",
+                f"{what} reaches sin θ = {sine:.4g} along {name} but samples every {pitch * 1e6:.4g} µm "
+                f"resolve directions up to {wavelength / (2 * pitch):.4g}. Use a finer or smaller grid.",
                 SamplingWarning,
                 stacklevel=3,
             )

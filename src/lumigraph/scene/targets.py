@@ -54,7 +54,7 @@ def pinhole(grid: Grid, diameter: float = 10e-6, position: Pair = (0.0, 0.0)) ->
     diameter
         [m]; a hole smaller than a sample gives it the intensity of its share of the area.
     position
-        Of the middle (y, x) [m].
+        Position of the middle (y, x) [m].
 
     Raises
     ------
@@ -171,7 +171,7 @@ def siemens_star(
     diameter
         [m]; None for nine tenths of the grid.
     position
-        Of the middle (y, x) [m].
+        Position of the middle (y, x) [m].
 
     Raises
     ------
@@ -210,9 +210,9 @@ def chessboard(
     spacing
         Width of a square [m]; None for a board that fills the grid but for a margin of a square.
     angle
-        By which the board is turned, from +x towards +y [rad].
+        Rotation of the board, from +x towards +y [rad].
     position
-        Of the middle of the board (y, x) [m].
+        Position of the middle of the board (y, x) [m].
 
     Raises
     ------
@@ -308,7 +308,7 @@ def points(positions: Sequence[Sequence[float]], intensities: Sequence[float] | 
     positions
         (y, x) or (y, x, dz) of each [m]; dz from the focused plane, positive farther from the camera.
     intensities
-        Of each; None for 1.
+        Intensity of each; None for 1.
 
     Raises
     ------
@@ -341,9 +341,9 @@ def texture(grid: Grid, width: float, *, seed: int = 0) -> Scene:
     grid
         Samples of the focused plane.
     width
-        Of its grains, the standard deviation of the blur that makes them from noise [m].
+        Size of its grains, the standard deviation of the blur that makes them from noise [m].
     seed
-        Of the random numbers.
+        Seed of the random numbers.
 
     Examples
     --------

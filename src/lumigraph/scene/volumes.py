@@ -83,7 +83,7 @@ class Slice:
 
     @property
     def hides(self) -> bool:
-        """Whether it hides anything."""
+        """True if some part of the slice is opaque."""
         return self.opacity is not None and bool(self.opacity.any())
 
     def trimmed(self) -> "Slice":

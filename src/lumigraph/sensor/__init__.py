@@ -1,4 +1,4 @@
-"""From intensity on a grid to what a sensor reads out.
+"""Sensors: from intensity on a grid to the numbers read out.
 
 - `sensor`: `Sensor`, pixels that count photons, with noise and bits
 - `pixels`: `integrate`, mean intensity over each pixel's area, and its adjoint

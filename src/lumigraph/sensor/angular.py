@@ -1,4 +1,4 @@
-"""How much of light that arrives at an angle a pixel counts."""
+"""Response of a pixel to light that arrives at an angle."""
 
 import math
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class AngularResponse:
     power
         n; 0 for none.
     angles, values
-        Of the table v: angles from 0 on [rad], and the response there, above 0 and at most 1. Between them
+        Table v: angles from 0 on [rad], and the response there, above 0 and at most 1. Between them
         it is interpolated without overshoot (PCHIP); beyond the last angle it keeps the last value.
 
     Raises
@@ -63,7 +63,7 @@ class AngularResponse:
 
     @property
     def is_flat(self) -> bool:
-        """Whether it is 1 at all angles."""
+        """True if the response is 1 at all angles."""
         return not self.power and all(value == 1 for value in self.values)
 
     def of(self, angle: np.ndarray | float) -> np.ndarray:
@@ -77,5 +77,5 @@ class AngularResponse:
         return response
 
     def amplitude(self, tangent: np.ndarray | float) -> np.ndarray:
-        """What it multiplies amplitudes by that arrive at angles of a tangent: √r."""
+        """Factor √r of amplitudes that arrive at angles of a tangent."""
         return np.sqrt(self.of(np.arctan(tangent)))

@@ -1,4 +1,4 @@
-"""Colour filters on pixels: what they see of a picture, and the picture from what they saw."""
+"""Colour filters on pixels: mosaic of a picture, and its demosaicing."""
 
 import importlib
 import warnings
@@ -27,7 +27,7 @@ _ROWS, _REACH = 512, 16  # rows demosaiced at once, and pixels around them that 
 
 
 def mosaic(image: Array, pattern: str = "RGGB") -> Array:
-    """What pixels behind a Bayer filter see of a colour image.
+    """Raw image (y, x) of a colour image behind a Bayer filter.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def _mirrored(start: int, stop: int, n: int) -> np.ndarray:
 
 
 def levels(raw: RawImage) -> tuple[np.ndarray, np.ndarray]:
-    """What the first 2 x 2 pixels of a raw image read without light, and at most (2, 2), as it records them.
+    """Black and white level (2, 2) each of the first 2 x 2 pixels of a raw image, as it records them.
 
     Parameters
     ----------

@@ -136,9 +136,9 @@ def averages(centers: np.ndarray, width: float, n: int, pitch: float, center: fl
     Parameters
     ----------
     centers, width
-        Of the pixels along the axis [m].
+        Centres and width of the pixels along the axis [m].
     n, pitch, center
-        Of the samples [m].
+        Number, pitch and centre of the samples [m].
 
     Notes
     -----

@@ -45,13 +45,13 @@ class Sensor:
     read_noise
         Standard deviation of the reading [electrons].
     bits
-        Of the numbers read out, 1 to 16.
+        Bits of the numbers read out, 1 to 16.
     quantum_efficiency
         Electrons per photon, above 0 and at most 1.
     dark_current
         Electrons per second without light.
     exposure_time
-        For which the dark current runs [s]. Light is given for the whole exposure.
+        Time for which the dark current runs [s]. Light is given for the whole exposure.
     black_level
         Number that no electrons read. Without one the noise of dark pixels is clipped at 0.
     prnu
@@ -59,12 +59,12 @@ class Sensor:
     dsnu
         Dark signal non-uniformity: standard deviation of the pixels' dark signal [electrons].
     pattern_seed
-        Of both fixed patterns: sensors of one seed are the same piece of silicon.
+        Seed of both fixed patterns: sensors of one seed are the same piece of silicon.
     fill_factor
         Width of a pixel's active square over the pitch: the rest of its area is dark, so that even light of
         1 reads fill_factor², and the pixel's transfer function is sinc(fill_factor · pitch · f).
     angular_response
-        By the angle of incidence; None where it does not matter.
+        Response by the angle of incidence; None where it does not matter.
 
     Raises
     ------
@@ -154,7 +154,7 @@ class Sensor:
         photons: float | None = None,
         rng: np.random.Generator | None = None,
     ) -> RawImage:
-        """What is read out of an intensity: photon and read noise, fixed patterns, whole numbers.
+        """Raw image of an intensity: photon and read noise, fixed patterns, whole numbers.
 
         Parameters
         ----------
@@ -165,7 +165,7 @@ class Sensor:
         fill
             Fraction of a full well, above 0; more than 1 overexposes.
         photons
-            That an intensity of 1 sends to a pixel, in the place of `reference` and `fill`.
+            Photons that an intensity of 1 sends to a pixel, in the place of `reference` and `fill`.
         rng
             Random numbers; None for an exposure without noise. The fixed patterns always show.
 

@@ -1,4 +1,4 @@
-"""What a simulation asks of an instrument."""
+"""Protocols of the instruments that a simulation accepts."""
 
 from typing import Protocol, runtime_checkable
 
@@ -11,23 +11,23 @@ from lumigraph.sensor import Sensor
 
 @runtime_checkable
 class Imaging(Protocol):
-    """Anything with elements that light goes through to a sensor."""
+    """Protocol of an instrument whose elements lead light to a sensor."""
 
     def image_train(self) -> Train:
-        """From the field just before the main lens to the sensor."""
+        """Elements from the field just before the main lens to the sensor."""
         ...
 
 
 class Camera(Imaging, Protocol):
-    """An instrument, as `simulate` sees it; what belongs to lenslets is None without them."""
+    """Protocol of a camera that `simulate` accepts; members of lenslets are None without them."""
 
     def optics(self) -> CameraOptics:
-        """What operators read of it."""
+        """Plain values of the camera, which operators read."""
         ...
 
     @property
     def wavelength(self) -> float:
-        """In vacuum [m]."""
+        """Wavelength in vacuum [m]."""
         ...
 
     @property
@@ -47,12 +47,12 @@ class Camera(Imaging, Protocol):
 
     @property
     def pupil_diameter(self) -> float:
-        """Of the main lens [m]."""
+        """Diameter of the main lens' stop [m]."""
         ...
 
     @property
     def lattice(self) -> Lattice | None:
-        """Where the lenslets stand [m]."""
+        """Lattice of the lenslets [m]; None without lenslets."""
         ...
 
     @property
@@ -85,5 +85,5 @@ class Camera(Imaging, Protocol):
         ...
 
     def relay_train(self) -> Train | None:
-        """From the field just before the lenslets to the sensor."""
+        """Elements from the field just before the lenslets to the sensor."""
         ...

@@ -1,4 +1,4 @@
-"""How the light of a scene interferes with itself.
+"""Coherence of a scene's light: which parts of it interfere.
 
 A coherence turns the parts of a scene into *shots*: fields that are mutually incoherent, so that their
 intensities on the sensor are added, each with a weight.
@@ -23,7 +23,7 @@ from lumigraph.simulation import directions
 Seed = int | np.random.Generator | None
 
 BLOCKS = 8
-"""Of shots, whose spread tells the error: two show one difference, which by chance may be small."""
+"""Blocks of shots, whose spread shows the error: two show one difference, which by chance may be small."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +39,7 @@ class Plane:
     distance
         To the main lens [m].
     pupil_diameter
-        Of the main lens [m].
+        Diameter of the main lens' stop [m].
     """
 
     amplitude: np.ndarray
@@ -49,7 +49,7 @@ class Plane:
 
 
 class Coherence(Protocol):
-    """What `simulate` asks of a coherence: shots, and their illumination of one plane of the scene."""
+    """Protocol of a coherence: shots, and their illumination of one plane of the scene."""
 
     @property
     def shots(self) -> int:
@@ -58,7 +58,7 @@ class Coherence(Protocol):
 
     @property
     def planes_independent(self) -> bool:
-        """Whether planes have independent phases in each shot, and may so share one propagation."""
+        """True if planes have independent phases in each shot, and so may share one propagation."""
         ...
 
     @property
@@ -164,7 +164,7 @@ class Snapshots:
 
     @property
     def convergence(self) -> float:
-        """That of random numbers."""
+        """Power 0.5, as for independent random numbers."""
         return 0.5
 
     @property
@@ -282,7 +282,7 @@ class TiltedWaves:
 
     @property
     def convergence(self) -> float:
-        """That of quasi-random points that count what lies in a disc: here, the main lens' pupil."""
+        """Power 0.75, as for quasi-random points counted in a disc: here, the main lens' pupil."""
         return 0.75
 
     @property
@@ -313,7 +313,7 @@ class TiltedWaves:
 
 @runtime_checkable
 class Source(Protocol):
-    """Where partially coherent light comes from, such as `scene.GaussianSchell` or `scene.ExtendedSource`."""
+    """Source of partially coherent light, such as `scene.GaussianSchell` or `scene.ExtendedSource`."""
 
     def sampled(
         self, grid: Grid, wavelength: float, distance: float, accuracy: float, dtype: Any
@@ -338,7 +338,7 @@ class PartiallyCoherent:
         `GaussianSchell` or `ExtendedSource`; or `CoherentModes` of the camera's wavelength, with a sample
         wherever a slice has one, in the focused plane.
     accuracy
-        Of a source's mutual intensity, over the largest intensity; that of `CoherentModes` is their own. Its
+        Error of a source's mutual intensity, over the largest intensity; `CoherentModes` have their own. Its
         share is part of ``metadata["error"]``.
 
     Raises

@@ -85,7 +85,7 @@ def share_of_light(amplitude: np.ndarray, grid: Grid, radius: float) -> tuple[np
     Parameters
     ----------
     amplitude
-        Of the object (y, x), real.
+        Amplitude of the object (y, x), real.
     grid
         Where its samples stand.
     radius

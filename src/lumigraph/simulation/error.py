@@ -1,4 +1,4 @@
-"""What a raw image promises: its estimated relative rms error, and where that comes from."""
+"""Estimated relative rms error of a raw image, and the source of each estimate."""
 
 import math
 import warnings
@@ -20,16 +20,16 @@ _MEASURED = {  # by benchmarks.accuracy and estimates, over the accuracy asked: 
 
 @dataclass(frozen=True, slots=True)
 class Reached:
-    """How far off an image, or a part of it, is.
+    """Estimated error of an image, or of a part of it.
 
     Parameters
     ----------
     rms
         Relative rms error, estimated.
     source
-        How it is known.
+        Source of the estimate.
     paraxial
-        By how much parabolic lenses are off beside this, relative rms, estimated; 0 where lenses are exact.
+        Additional error of parabolic lenses, relative rms, estimated; 0 where lenses are exact.
     """
 
     rms: float
@@ -37,26 +37,26 @@ class Reached:
     paraxial: float = 0.0
 
     def and_also(self, rms: float, source: str = "") -> "Reached":
-        """With an independent error, which may have a source of its own."""
+        """Error together with an independent one, which may have a source of its own."""
         return replace(self, rms=math.hypot(self.rms, rms), source=self.source + source)
 
     def through(self, camera: CameraOptics) -> "Reached":
-        """Of an image by a camera's parabolic lenses and lenslets."""
+        """Error of an image formed by a camera's parabolic lenses and lenslets."""
         return self if camera.array is None else replace(self, paraxial=paraxial_error(camera))
 
 
 def of_quadrature(path: str, accuracy: float) -> Reached:
-    """Of a path that takes an accuracy: what was measured of it, between three of them by powers."""
+    """Error of a path that takes an accuracy: measured at three accuracies, power laws in between."""
     share = np.interp(-math.log10(accuracy), (2, 3, 4), np.log(_MEASURED[path]))
     return Reached(accuracy * math.exp(share), f"{path} at accuracy {accuracy:g}")
 
 
 SINGLE = 1.3
-"""How much farther off the image of one sample of a slice is than that of many."""
+"""Ratio of the error of one sample's image to that of many samples'."""
 
 
 def of_operator(intensity: np.ndarray, accuracy: float) -> Reached:
-    """Of a slice's image: less of many samples than of few, whose errors differ."""
+    """Error of a slice's image: smaller for many samples than for few, whose errors differ."""
     light, squared = float(np.abs(intensity).sum()), float(np.square(intensity, dtype=float).sum())
     few = SINGLE * math.sqrt(squared) / (light or 1.0)
     found = of_quadrature("operator", accuracy)
@@ -64,30 +64,30 @@ def of_operator(intensity: np.ndarray, accuracy: float) -> Reached:
 
 
 ROUNDING = 1.5e-6
-"""Of points' images in single precision, relative rms."""
+"""Rounding error of points' images in single precision, relative rms."""
 
 
 def of_points(difference: float, accuracy: float) -> Reached:
-    """By what `points.image_and_error` finds of the brightest."""
+    """Error of points, from the difference that `points.image_and_error` finds for the brightest."""
     return Reached(difference, f"points at accuracy {accuracy:g}, beside another image of one").and_also(
         ROUNDING
     )
 
 
 def of_white(difference: float, accuracy: float) -> Reached:
-    """By what `white.image_and_error` finds."""
+    """Error of a white image, from the difference that `white.image_and_error` finds."""
     return Reached(
         difference, f"white image at accuracy {accuracy:g}, beside light that is followed less far"
     )
 
 
 def of_convolution(operator_error: float, source: str = "") -> Reached:
-    """Of a camera without lenslets, by what its operator states."""
+    """Error of a camera without lenslets, from the one that its operator states."""
     return Reached(max(operator_error, ROUNDING), f"convolution with a point's image{source}")
 
 
 def of_grids(camera: Camera) -> Reached:
-    """Of fields that are propagated on grids, whatever their number: by what exact images of slices differ.
+    """Error of fields propagated on grids, whatever their number: measured against exact images of slices.
 
     Before lenslets 1.7e-2 to 3e-2. Without them paraxial lenses and exact free space differ by a spherical
     aberration of W = D⁴/(128 λL³) waves: f/16 to f/63 and 120 mm by 2e-4 to 1e-3, f/8 by 0.1 to 2 W.
@@ -100,7 +100,7 @@ def of_grids(camera: Camera) -> Reached:
 
 
 def together(parts: Sequence[tuple[float, Reached]]) -> Reached | None:
-    """Of a sum of images of the given norms, whose errors are independent."""
+    """Error of a sum of images of the given norms, whose errors are independent."""
     if not parts:
         return None
     whole = math.hypot(*(norm for norm, _ in parts)) or 1.0

@@ -59,7 +59,7 @@ def _leaning(
     light: Coherent | PartiallyCoherent | None,
     screens: Sequence[Screen],
 ) -> tuple[np.ndarray, error.Reached]:
-    """By cameras that do not lean."""
+    """Image of a part by a tilted camera, as the sum of upright cameras' images, and its error."""
     found, reached = flat(camera, accuracy), []
 
     def image(one: CameraOptics) -> np.ndarray:
@@ -81,7 +81,7 @@ def _image_of(
     light: Coherent | PartiallyCoherent | None,
     screens: Sequence[Screen],
 ) -> tuple[np.ndarray, error.Reached]:
-    """By a camera that does not lean."""
+    """Image of a part formed by an upright camera (ny, nx), and its error."""
     plain = camera.optics()
     if screens and not isinstance(part, Diffuser):
         return hidden_image(plain, part, accuracy, progress, screens)
@@ -112,7 +112,7 @@ def _image_of(
 def _lit(
     camera: CameraOptics, part: Slice, accuracy: float, light: Coherent | PartiallyCoherent
 ) -> tuple[np.ndarray, error.Reached]:
-    """Of a slice in light that interferes, wholly or in part."""
+    """Image of a slice in coherent or partially coherent light (ny, nx), and its error."""
     reached = error.of_quadrature("coherent", accuracy).through(camera)
     amplitude = np.sqrt(arrays.to_numpy(part.intensity))
     if isinstance(light, PartiallyCoherent):

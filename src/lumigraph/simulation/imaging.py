@@ -66,7 +66,7 @@ def simulate(
     Depths add up, and slices with an opacity hide what stands behind them, before cameras with lenslets and
     in incoherent light: each point that their edges hide in part sends its own wave past them (Kirchhoff's
     and Fresnel's integrals, to 1e-2 rms of these points' light). Where edges of two slices stand within some
-    Fresnel zones of each other, as a point sees them, the product is taken. Lenses are paraxial then.
+    Fresnel zones of each other, seen from a point, the product is taken. Lenses are paraxial then.
 
     Parameters
     ----------
@@ -75,11 +75,11 @@ def simulate(
     scene
         Slices, points and diffusers; see `lumigraph.targets`. Or a `Volume`, whose planes are slices.
     coherence
-        Of slices: `Incoherent` (default), `Coherent`, `PartiallyCoherent`, `Snapshots` or `TiltedWaves`. The
+        For slices: `Incoherent` (default), `Coherent`, `PartiallyCoherent`, `Snapshots` or `TiltedWaves`. The
         last two leave the raw image's relative rms error, estimated from the spread of blocks of their
         shots, in ``metadata["estimated_error"]``.
     spectrum
-        Wavelengths that take the place of the camera's own, and the channels that see them. Then slices
+        Wavelengths that take the place of the camera's own, and the channels that detect them. Then slices
         may be coloured, (y, x, 3), and the raw image is (ny, nx, 3) or a Bayer mosaic.
     progress
         Called as ``progress(fraction)`` after each propagation and while an operator is built.
@@ -87,7 +87,7 @@ def simulate(
         Runs the propagations, such as a pool's ``imap``; results are added in order, so that every map
         gives the same raw image.
     medium
-        What refracts before the scene, of light-field microscopes ("1.0" and "2.0"): slices that delay light,
+        Refracting medium before the scene, for microscopes "1.0" and "2.0": slices that delay light,
         by multislice; at most some thousand points and lit samples.
 
     Raises

@@ -1,4 +1,4 @@
-"""What has arrived on the sensor, and the raw image of it."""
+"""Light that has arrived on the sensor, and its raw image."""
 
 import math
 from dataclasses import dataclass, field
@@ -15,18 +15,18 @@ from lumigraph.simulation.coherence import Coherence, Incoherent, PartiallyCoher
 
 @dataclass(slots=True)
 class Shots:
-    """Sum of the images of mutually incoherent shots, block by block: what tells how far off it is.
+    """Sum of the images of mutually incoherent shots, in blocks whose spread gives its error.
 
     Parameters
     ----------
     camera
-        That they went through.
+        Camera of the shots.
     total
-        On the pixels, of all blocks that are complete.
+        Light on the pixels, of all blocks that are complete.
     drawn
         Shots in each of these.
     squares
-        Of their images' norms, each over its shots, summed.
+        Squared norms of their images, each over its shots, summed.
     """
 
     camera: Camera
@@ -45,7 +45,7 @@ class Shots:
         self._image = image if self._image is None else self._image + image
 
     def complete(self) -> None:
-        """What was begun is a block of its own."""
+        """Close the block of shots that was begun, and start a new one."""
         if self._image is None:
             return
         seen = integrate(self._image, self.camera.image_grid, self.camera.sensor)
@@ -73,7 +73,7 @@ class Shots:
 
 @dataclass(slots=True)
 class Light:
-    """What has arrived so far: intensity on the pixels, after `done` shots or parts."""
+    """Light that has arrived so far: intensity on the pixels, after `done` shots or parts."""
 
     pixels: np.ndarray
     shots: Shots

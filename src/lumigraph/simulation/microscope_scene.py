@@ -1,6 +1,6 @@
 """Raw images of scenes by a light-field microscope: slices on its operator's samples, points where they are.
 
-All light is incoherent: fluorescence. What stands beyond the field that the lenslets see is left out.
+All light is incoherent: fluorescence. Parts beyond the field of the lenslets are left out.
 """
 
 import math
@@ -34,15 +34,15 @@ SAMPLES = 5
 _SOURCE = "cells treated as far, what samples behind a lenslet do not hold, samples of slices"
 
 COARSER = 1.5
-"""Pitch of the samples that tell the error of an operator's own, over theirs."""
+"""Pitch of the samples that estimate the error of an operator's own, over theirs."""
 
 LEAST = 0.5
-"""Of the accuracy asked for, that an operator is made for where samples of a slice take up the rest."""
+"""Smallest part of the accuracy left to an operator, if a slice's samples take up the rest."""
 
 
 @runtime_checkable
 class Microscope(Protocol):
-    """What is asked of a light-field microscope."""
+    """Protocol of a light-field microscope that images a scene."""
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
@@ -66,7 +66,7 @@ class Microscope(Protocol):
         *,
         accuracy: float,
     ) -> Any:
-        """How it sees slices."""
+        """Operator from slices of the object to the raw image."""
         ...
 
     @property
@@ -99,7 +99,7 @@ def microscope_image(
     """
     if not isinstance(coherence, Incoherent):
         raise GeometryError(
-            f"coherence is {coherence!r} but a light-field microscope sees fluorescence, which does not "
+            f"coherence is {coherence!r} but a light-field microscope images fluorescence, which does not "
             "interfere. Leave coherence out."
         )
     if not scene.parts:
@@ -152,7 +152,7 @@ def _points_image(scope: Microscope, part: Points, accuracy: float) -> tuple[np.
 
 
 def _slice_image(scope: Microscope, part: Slice, accuracy: float) -> tuple[np.ndarray, float]:
-    """By an operator as fine as the slice; or else as the objective resolves, or else more exact."""
+    """Image of a slice and its error; the operator is as fine as the slice, then finer, then more exact."""
     if part.intensity.ndim != 2:
         raise GeometryError(
             f"a slice has shape {part.intensity.shape} but one wavelength needs grey (y, x). "
@@ -225,13 +225,13 @@ def averaged(picture: np.ndarray, grid: Grid, wanted: Grid) -> np.ndarray:
 
 
 def _shares(at: np.ndarray, pitch: float, wanted: np.ndarray, step: float) -> np.ndarray:
-    """What part of each wanted sample (rows) each sample (columns) covers."""
+    """Part of each wanted sample (rows) that each sample (columns) covers."""
     rows = [coverage.interval(at, pitch, y - step / 2, y + step / 2) for y in wanted]
     return np.array(rows) * (pitch / step)
 
 
 def _white(operator: Any) -> np.ndarray:
-    """Of an even plane that goes on beyond the lenslets."""
+    """Image of an even plane that extends beyond the lenslets."""
     if not isinstance(operator, MicroscopeOperator):
         return operator.forward(np.ones(operator.shape[1], np.float32))
     N = operator.kernels[0].sampling.pixels

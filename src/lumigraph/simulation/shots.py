@@ -25,10 +25,10 @@ class Shot:
     train: Train
     weight: float
     block: int = 0
-    """Of the blocks of a random or quasi-random sample, the one that this shot belongs to."""
+    """Block of a random or quasi-random sample to which this shot belongs."""
 
     def arrive(self) -> tuple[int, np.ndarray]:
-        """Its block, and its intensity on the samples of the image."""
+        """Block of the shot, and its intensity on the samples of the image."""
         *elements, last = self.train.elements or (Train(()),)
         before = Train(elements)(self.field)
         intensity = last.intensity(before) if isinstance(last, Propagate) else last(before).intensity
@@ -42,7 +42,7 @@ def number_of_shots(slices: list[Slice], coherence: Coherence) -> int:
 
 
 def shots(camera: Camera, slices: list[Slice], coherence: Coherence) -> Iterator[Shot]:
-    """What independent planes send goes together in one propagation: its interference averages out."""
+    """Shots of slices; independent planes share one propagation, as their interference averages out."""
     train, grid = camera.image_train(), camera.pupil_grid
     planes = [_plane(camera, part) for part in slices]
     # Each slice's own scale goes into its amplitude: its samples may differ in area.

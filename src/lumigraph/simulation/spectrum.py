@@ -17,7 +17,7 @@ from lumigraph.simulation import curves
 
 @dataclass(frozen=True, slots=True)
 class Spectrum:
-    """Wavelengths, and how much of each the sensor's channels see.
+    """Wavelengths, and the response of the sensor's channels to each.
 
     Thin lenses are free of dispersion: what differs between the wavelengths is diffraction. A main lens of a
     prescription, and lenslets with an Abbe number, have the colours of their glass, focused at the camera's
@@ -26,14 +26,14 @@ class Spectrum:
     Parameters
     ----------
     wavelengths
-        In vacuum [m].
+        Wavelengths in vacuum [m].
     weights
         (wavelengths, channels), channels 1 or 3 (red, green, blue), not negative; those of a channel are
         scaled to a sum of 1, so that an even white scene has mean 1 in all of them.
     bayer
         Pattern of a colour filter, such as "RGGB": the raw image is (ny, nx). None keeps (ny, nx, 3).
     error
-        What few wavelengths leave of the degree of coherence; raw images count it in their error.
+        Error of the degree of coherence by few wavelengths; raw images count it in their error.
 
     Raises
     ------
@@ -70,13 +70,13 @@ class Spectrum:
 
     @classmethod
     def band(cls, shortest: float, longest: float, count: int = 5) -> "Spectrum":
-        """One channel that sees a band [m] evenly, by so many wavelengths."""
+        """One channel with an even response over a band [m], by so many wavelengths."""
         count = checks.whole("count", count)
         return cls(tuple(np.linspace(shortest, longest, count).tolist()), ((1.0,),) * count)
 
     @classmethod
     def line(cls, line: SpectralLine, path_difference: float, accuracy: float = 1e-3) -> "Spectrum":
-        """One channel that sees a narrow line, as light of a largest path difference [m] shows it.
+        """One channel for a narrow line, for light of a largest path difference [m].
 
         Its degree of coherence over that way is right to an accuracy.
         """
@@ -95,9 +95,9 @@ class Spectrum:
         accuracy: float = 1e-2,
         bayer: str | None = None,
     ) -> "Spectrum":
-        """Of a light, filters and pixels that are known as curves, linear between their wavelengths.
+        """Spectrum of a light, filters and pixels given as curves, linear between their wavelengths.
 
-        Each channel has wavelengths of its own, Gauss's nodes of its light: as few as keep its degree of
+        Each channel has its own wavelengths, Gauss's nodes of its light: as few as keep its degree of
         coherence to an accuracy over the largest path difference, such as a `camera.path_difference`.
 
         Parameters
@@ -111,9 +111,9 @@ class Spectrum:
         light
             (n,) per wavelength, in any unit, such as of a lamp; None for an even one.
         accuracy
-            Of the degree of coherence.
+            Accuracy of the degree of coherence.
         bayer
-            As of a `Spectrum`.
+            Bayer pattern as of a `Spectrum`.
 
         Raises
         ------
@@ -161,7 +161,7 @@ class Spectrum:
         return cls((red, green, blue), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), bayer)
 
     def lit(self, scene: Scene, number: int) -> Scene:
-        """What the scene gives off at a wavelength: colours (y, x, 3) by the channels that see it."""
+        """Scene at one wavelength: colours (y, x, 3) weighted by the channels that detect it."""
         parts = []
         for part in scene.parts:
             if isinstance(part, Slice) and part.intensity.ndim == 3:

@@ -1,4 +1,4 @@
-"""Scenes that a microscope sees through a medium: every lit sample is a point with an image of its own."""
+"""Scenes imaged through a medium by a microscope: each lit sample is a point with its own image."""
 
 import math
 import warnings
@@ -28,7 +28,7 @@ PUPIL, FINEST = 0.7, 1e-5
 
 
 class Seeing(Protocol):
-    """What is asked of a light-field microscope."""
+    """Protocol of a light-field microscope that images through a medium."""
 
     @property
     def sensor(self) -> Sensor:
@@ -66,13 +66,13 @@ def lit_points(scope: Seeing, scene: Scene) -> Points:
     if len(points.intensities) > MOST:
         raise SamplingError(
             f"the scene has {len(points.intensities)} points and lit samples but a medium takes {MOST} at "
-            "most: each has an image of its own. Use a smaller scene, or samples farther apart."
+            "most: each is imaged separately. Use a smaller scene, or samples farther apart."
         )
     return points
 
 
 def _samples(part: Slice, grid: Grid) -> Points:
-    """Of a slice, as bright as its samples are large over those of the microscope."""
+    """Points of a slice, scaled by the area of its samples over those of the microscope."""
     if part.intensity.ndim != 2:
         raise GeometryError(
             f"a slice has shape {tuple(part.intensity.shape)} but a medium needs grey (y, x)."
@@ -134,7 +134,7 @@ def _say_how_long(seen: Seen, points: Points) -> None:
 
 
 def _between_planes(seen: Seen, points: Points, accuracy: float) -> float:
-    """How far off a volume's planes are, of the brightest of the points that most of them stand before."""
+    """Relative rms error from a volume's spacing of planes, for the brightest of the deepest points."""
     deepest = points.positions[:, 2] >= points.positions[:, 2].max()
     place = points.positions[int(np.argmax(np.where(deepest, points.intensities, -np.inf)))]
     between = seen.between_planes(place)

@@ -1,4 +1,4 @@
-"""What is kept on disk: whole or not at all, and never read damaged.
+"""Arrays on disk: written whole or not at all, and never read damaged.
 
 - `cabinet`: arrays kept between runs under a key, in the user's cache folder or another; a budget in bytes
 - `sealed`: one file of arrays with a checksum over every byte, read as memory maps

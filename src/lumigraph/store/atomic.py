@@ -41,9 +41,9 @@ def write_bytes(path: str | os.PathLike[str], content: bytes, *, flush: bool = T
     Parameters
     ----------
     path, content
-        Of the file.
+        Path and content of the file.
     flush
-        Whether to wait until the disk has it. Without, a cut of the power may leave a torn file, though a
+        True to wait until the disk has it. Without, a cut of the power may leave a torn file, though a
         kill does not: for files whose checksum is kept elsewhere.
 
     Raises
@@ -91,14 +91,14 @@ def sweep(folder: Path) -> None:
 
 
 def sweep_once(folder: Path) -> None:
-    """As `sweep`, unless this process has done so."""
+    """Run `sweep`, unless this process has done so."""
     if folder not in _SWEPT:
         _SWEPT.add(folder)
         sweep(folder)
 
 
 def restored(path: Path) -> bool:
-    """Whether something lies at `path` after all: a writer may stand, or have died, between two steps."""
+    """True if `path` exists after all: a writer may pause, or have died, between two steps."""
     end = time.monotonic() + _PATIENCE
     while not path.exists() and _set_aside(path) and time.monotonic() < end:
         sweep(path.parent)

@@ -22,7 +22,7 @@ _ENDING = ".kept.npz"
 
 
 def folder() -> Path | None:
-    """Where arrays are kept; None where they are not, as for a user without a home."""
+    """Folder of the stored arrays; None if arrays are not stored, as for a user without a home."""
     chosen = os.environ.get("LUMIGRAPH_CACHE", "")
     if chosen.lower() == "off":
         return None
@@ -73,7 +73,7 @@ def kept(
 
 
 def _found(path: Path) -> dict[str, np.ndarray] | None:
-    """What a file holds; None where there is none or it is damaged, in which case it is removed."""
+    """Content of a file; None if there is none or it is damaged, in which case it is removed."""
     try:
         found = sealed.read(path, mapped=True)
     except OSError:

@@ -42,9 +42,9 @@ def write(path: str | os.PathLike[str], arrays: Mapping[str, np.ndarray]) -> Non
     Parameters
     ----------
     path
-        Of the file; its folder exists.
+        Path of the file; its folder exists.
     arrays
-        By name. Values, type and order in memory (C or Fortran) are kept; an array that is neither is
+        Arrays by name. Values, type and order in memory (C or Fortran) are kept; an array that is neither is
         written in C order.
 
     Raises
@@ -73,11 +73,11 @@ def read(
     Parameters
     ----------
     path
-        Of the file.
+        Path of the file.
     mapped
-        Whether the arrays are read-only memory maps; else they are copies.
+        True for read-only memory maps; else the arrays are copies.
     written
-        Whether this process has just written it: then the checksum is not computed once more.
+        True if this process has just written it: then the checksum is not computed once more.
 
     Raises
     ------

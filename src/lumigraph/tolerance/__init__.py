@@ -1,12 +1,11 @@
-"""What errors of making do to a camera: cameras as built, how much each tolerance costs, and by chance.
+"""Manufacturing tolerances: cameras as built, the effect of each tolerance, and Monte Carlo trials.
 
-- `lumigraph.instruments.Tolerance`: how far a value may be off; camera files have them in ``[tolerances]``.
-- `built`: the camera with errors, all else where its description puts it; `drawn`, `cameras`: errors, and
-  cameras, by chance (`making`).
-- `measures`: what follows from a camera as built beside what was meant; `single`: what single lenslets do to
-  it that differ.
-- `study`: many cameras drawn by chance (`trials`) beside first-order sensitivities, a `Study` with an
-  `Outcome` for each measure.
+- `lumigraph.instruments.Tolerance`: the error of a value; camera files have them in ``[tolerances]``.
+- `making`: `built`, the camera with given errors; `drawn`, `cameras`: random errors, and such cameras.
+- `measures`: results of a camera as built beside those of its description; `single`: effects of single
+  lenslets that differ.
+- `study`: many random cameras (`trials`) beside first-order sensitivities, a `Study` with an `Outcome` for
+  each measure.
 """
 
 from lumigraph.tolerance.making import built, cameras, drawn

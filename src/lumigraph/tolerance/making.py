@@ -1,4 +1,4 @@
-"""A camera with errors of making, and such errors by chance."""
+"""Cameras with manufacturing errors, given or random."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -23,11 +23,11 @@ _SCATTERS = {
     "focal_length": "focal_length_scatter", "decentre": "decentre_scatter", "missing": "missing",
     "tilt": "tilt_scatter", "form": "form_scatter",
 }  # fmt: skip
-"""Keys of ``[built]`` by what each lenslet has of its own."""
+"""Keys of ``[built]`` by the error that differs from lenslet to lenslet."""
 
 
 def check_camera(camera: AnyCamera | LensletCamera | Instrument) -> LensletCamera:
-    """The camera, if its errors of making are known.
+    """The camera, if its manufacturing errors are known.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def check_camera(camera: AnyCamera | LensletCamera | Instrument) -> LensletCamer
 
 
 def _path(name: str) -> tuple[str | int, ...]:
-    """Where a value stands in the table of a camera as built."""
+    """Path of a value in the table of a camera as built."""
     check_name(name)
     if name in ("separation", "lenslet_distance", "array_bow"):
         return "built", name
@@ -65,7 +65,7 @@ def _meant(camera: LensletCamera) -> dict[str, Any]:
 
 
 def _holder(table: Any, path: Sequence[str | int]) -> Any:
-    """What holds the last part of a path; an aberration that is not there is 0."""
+    """Table that holds the last part of a path; an aberration that is not there is 0."""
     for part in path[:-1]:
         table = table[part]
     if path[-1] not in table and isinstance(table, dict):
@@ -90,7 +90,7 @@ def value_of(camera: LensletCamera, name: str) -> float:
 
 
 def built(camera: LensletCamera, errors: Mapping[str, float]) -> LensletCamera:
-    """The camera with errors of making: whatever has none stays where the description puts it.
+    """Camera with manufacturing errors: whatever has none stays where the description puts it.
 
     A lenslet that is too strong moves no sensor, as it would if the camera were described with it: distances,
     stop and sensor are those of the camera that was meant. A plane that is not in focus is seen blurred.
@@ -98,7 +98,7 @@ def built(camera: LensletCamera, errors: Mapping[str, float]) -> LensletCamera:
     Parameters
     ----------
     camera
-        What is meant.
+        The camera as described.
     errors
         What is added to its values, in SI, by the names of `Tolerance`; of several lenslet focal lengths to
         each. Names below "lenslets.each" have a standard deviation, or the part that is missing, of lenslets
@@ -139,7 +139,7 @@ def built(camera: LensletCamera, errors: Mapping[str, float]) -> LensletCamera:
 def tolerances_of(
     camera: LensletCamera, given: Mapping[str, str | Tolerance] | None = None
 ) -> tuple[Tolerance, ...]:
-    """Those of the camera file, and those given beside or instead of them.
+    """Tolerances of the camera file, and those given beside or instead of them.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def drawn(
 ) -> dict[str, float]:
     """Errors [SI] by name of one camera of many, by chance.
 
-    Each tolerance has random numbers of its own: one more or less leaves those of the others. Where
+    Each tolerance has separate random numbers: one more or less leaves those of the others. Where
     lenslets have errors of their own, these are standard deviations, and "built.seed" draws them.
 
     Parameters
@@ -216,7 +216,7 @@ def cameras(
     Parameters
     ----------
     camera
-        What is meant.
+        The camera as described.
     tolerances
         Beside those of the camera file, or instead of them.
     count

@@ -1,4 +1,4 @@
-r"""What follows from a camera as built, beside what was meant: focus, depth, blur, micro-images.
+r"""Measures of a camera as built, beside its description: focus, depth, blur, micro-images.
 
 A point at z1 has its image at z2 behind the main lens, a = L - z2 before the lenslets. Its place in the
 micro-images moves from lenslet to lenslet, beside the micro-images' own middles, by p b z2/(a L). With the
@@ -23,7 +23,7 @@ STREHL = "lenslet Strehl ratio"
 
 
 def measures(camera: LensletCamera, made: LensletCamera) -> tuple[Row, ...]:
-    """What follows from a camera as built, lengths in metres.
+    """Measures of a camera as built, lengths in metres.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def measures(camera: LensletCamera, made: LensletCamera) -> tuple[Row, ...]:
 
 
 def of_making(camera: LensletCamera, made: LensletCamera) -> Iterator[Row]:
-    """Those that only a camera as built has."""
+    """Measures that only a camera as built has."""
     scatter = made.errors
     single = Single() if scatter is None else Single.of(made, scatter)
     near = focused_distance(made)
@@ -72,7 +72,7 @@ def of_differing(camera: LensletCamera) -> Callable[[Differ], dict[str, float]]:
 
 
 def _of_lenslets(camera: LensletCamera, made: LensletCamera, single: Single) -> Iterator[Row]:
-    """Those that lenslets change which differ from each other."""
+    """Measures that change with lenslets that differ from each other."""
     read = read_distance(camera, made, single.slope)
     yield Row("depth error", read - made.object_distance, "m",
               "of a point in that plane, read with the distances that were meant")  # fmt: skip
@@ -165,7 +165,7 @@ def _blur(made: LensletCamera, factor: float) -> float:
 
 
 def _corner_shift(camera: LensletCamera, made: LensletCamera, single: Single) -> tuple[float, float]:
-    """Of the micro-image behind the last lenslet of the array, on the raw image [px]."""
+    """Shift (y, x) of the micro-image behind the last lenslet of the array, on the raw image [px]."""
     index = last(camera.lenslets)  # pyright: ignore[reportArgumentType] - frozen models can be hashed
     places = []
     for one in (at_corner(made), at_corner(camera)):
@@ -176,5 +176,5 @@ def _corner_shift(camera: LensletCamera, made: LensletCamera, single: Single) ->
 
 
 def is_finite(value: object) -> bool:
-    """Whether a value is a number that can be averaged."""
+    """True if a value is a number that can be averaged."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

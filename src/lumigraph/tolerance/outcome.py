@@ -1,11 +1,11 @@
-r"""`Outcome`: what tolerances do to one measure, to first order and by chance.
+r"""`Outcome`: the effect of tolerances on one measure, to first order and by Monte Carlo.
 
 With one standard deviation of error i either way the measure is y+ and y-, and without error y0:
 
 .. math:: e_i = \frac{y_+ - y_-}{2}, \quad \sigma = \sqrt{\sum_i e_i^2}, \quad h_i = \frac{y_+ + y_-}{2} - y_0
 
-Beside it stand mean and deviation of cameras that are drawn by chance, with their statistical errors:
-s/√n of the mean, √((m4 - s⁴)/n)/(2 s) of the deviation, with the fourth central moment m4.
+Mean and deviation of random cameras have the statistical errors s/√n and √((m4 - s⁴)/n)/(2 s), with the
+fourth central moment m4.
 """
 
 import math
@@ -18,7 +18,7 @@ import numpy as np
 from lumigraph.core.brief import brief
 
 PERCENTS = (2.5, 50.0, 97.5)
-"""Percentiles that are told."""
+"""Percentiles that are reported."""
 
 _SURE = 3.0  # statistical errors beyond which two deviations differ
 _LINEAR = 0.1  # part by which they may differ where errors count as small
@@ -26,7 +26,7 @@ _LINEAR = 0.1  # part by which they may differ where errors count as small
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What tolerances do to one measure.
+    """Effect of tolerances on one measure.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Outcome:
 
     @property
     def mean(self) -> float:
-        """Of the cameras drawn."""
+        """Mean over the cameras drawn."""
         return float(np.mean(self.sample))
 
     @property
@@ -99,7 +99,7 @@ class Outcome:
 
     @property
     def is_linear(self) -> bool:
-        """Whether first order explains the deviation: to 10 % by second order, and by the cameras drawn.
+        """True if first order explains the deviation: to 10 % by second order, and by the cameras drawn.
 
         By these beyond three statistical errors; second order adds 2 h² to the variance of a normal error.
         """
@@ -110,7 +110,7 @@ class Outcome:
 
     @property
     def changes(self) -> bool:
-        """Whether any tolerance changes the measure by more than rounding."""
+        """True if any tolerance changes the measure by more than rounding."""
         least = 1e-9 * max(abs(self.nominal), abs(self.mean))
         return max(self.first_order, self.deviation) > least
 

@@ -1,14 +1,12 @@
-r"""What lenslets that differ from each other do to measures, by rays.
+r"""Effects of lenslets that differ from each other on measures, by rays.
 
-A lenslet whose vertex is off by d moves all that is behind it by d b/f; one whose surface is tilted by θ by
-(n - 1) θ b, as if its vertex were off; one whose form is off by b times the mean slope of the path through
-it: so far the middle of light (its centroid) moves, by wave optics too. Places of a point behind the lenslets
-that see it, each with its share w of the point's light, then have a slope over the lenslets' places r of
+Decentre, tilt and form of a lenslet move the centroid of the light behind it. Places of a point behind the
+lenslets that see it, each with its share w of the light, then have an additional slope over the lenslets'
+places r, by the shifts s:
 
 .. math:: \frac{\sum w (r - \bar r) \cdot s}{\sum w |r - \bar r|^2}
 
-where s are these shifts, beside the one that tells its depth. Independent errors of the lenslets add up by
-their squares, to first order: `changes` tries one lenslet after the other.
+Derivation, and the sum over lenslets (`changes`): docs/theory/tolerance.md.
 """
 
 import math
@@ -31,21 +29,21 @@ _ACROSS = 128
 """Rays across the stop."""
 
 _NODES = 24
-"""Of quadrature across a lenslet."""
+"""Nodes of quadrature across a lenslet."""
 
 Errors = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Of lenslets: factors of focal lengths, decentres along columns and rows [m], and presence."""
+"""Errors of lenslets: factors of focal lengths, decentres along columns and rows [m], and presence."""
 
 
 class Differ(Protocol):
-    """How lenslets differ, as `lumigraph.elements.Scatter` says."""
+    """Differences between lenslets, as `lumigraph.elements.Scatter` has them."""
 
     def of(self, i: np.ndarray, j: np.ndarray) -> Errors:
         """Errors of lenslets (i, j)."""
         ...
 
     def warp(self, i: np.ndarray, j: np.ndarray) -> Warp:
-        """What paths through lenslets (i, j) have besides."""
+        """Additional paths through lenslets (i, j)."""
         ...
 
 
@@ -78,7 +76,7 @@ class One:
     terms: Mapping[int, float] = field(default_factory=dict)
 
     def of(self, i: np.ndarray, j: np.ndarray) -> Errors:
-        """As `Differ.of`."""
+        """Errors of lenslets (i, j), as `Differ.of`."""
         mine = (i == self.index[0]) & (j == self.index[1])
         return (
             np.where(mine, self.factor, 1.0), np.where(mine, self.down, 0.0),
@@ -86,7 +84,7 @@ class One:
         )  # fmt: skip
 
     def warp(self, i: np.ndarray, j: np.ndarray) -> Warp:
-        """As `Differ.warp`."""
+        """Additional paths, as `Differ.warp`."""
         mine = (i == self.index[0]) & (j == self.index[1])
         terms = np.zeros((*mine.shape, len(form.TERMS)))
         for k, size in self.terms.items():
@@ -112,7 +110,7 @@ class Sight:
 
     @classmethod
     def of(cls, camera: LensletCamera) -> "Sight":
-        """Of a camera as built.
+        """Lenslets that see the point in a camera as built.
 
         Raises
         ------
@@ -137,7 +135,7 @@ class Sight:
 
 @dataclass(frozen=True, slots=True)
 class Single:
-    """What lenslets that differ do to measures.
+    """Effects of lenslets that differ on measures.
 
     Parameters
     ----------
@@ -161,7 +159,7 @@ class Single:
 
     @classmethod
     def of(cls, camera: LensletCamera, differ: Differ, sight: Sight | None = None) -> "Single":
-        """Of a camera as built.
+        """Effects in a camera as built.
 
         Raises
         ------
@@ -181,7 +179,7 @@ class Single:
 
 
 def _shifts(camera: LensletCamera, differ: Differ, indices: np.ndarray) -> np.ndarray:
-    """Of all that is behind lenslets (k, 2): (y, x) [m]."""
+    """Shifts (k, 2), (y, x), of all that is behind lenslets (k, 2) [m]."""
     i, j = indices.T
     factor, down, across, _ = differ.of(i, j)
     sin, cos = coverage.sides(camera.lattice.rotation)
@@ -195,7 +193,7 @@ def _shifts(camera: LensletCamera, differ: Differ, indices: np.ndarray) -> np.nd
 
 
 def _strehl(waves: np.ndarray) -> float:
-    """Of a lenslet whose form has these terms, in waves."""
+    """Strehl ratio of a lenslet whose form has these terms [waves]."""
     if not waves.any():
         return 1.0
     at, weight = np.polynomial.legendre.leggauss(_NODES)
@@ -210,7 +208,7 @@ def _slope(camera: LensletCamera, differ: Differ, sight: Sight) -> float:
     if there.sum() < 2:
         raise GeometryError(
             f"{int(there.sum())} of the {len(there)} lenslets that see a point are there, and one alone "
-            "tells no depth. Let fewer be missing."
+            "measures no depth. Let fewer be missing."
         )
     places, shares = camera.lattice.position(sight.indices[there]), sight.shares[there][:, None]
     places = places - (shares * places).sum(0) / shares.sum()

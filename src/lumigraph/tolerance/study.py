@@ -1,4 +1,4 @@
-"""`study`: cameras by chance beside first-order sensitivities, and which tolerance to pay for."""
+"""`study`: random cameras beside first-order sensitivities, and the most costly tolerances."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +22,7 @@ ROUNDING = {"m": 1e-12, "rad": 1e-12}
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What tolerances do to a camera.
+    """Result of a study: the effect of tolerances on a camera.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Study:
     draws
         Cameras that were drawn.
     failures
-        Why those among them cannot be.
+        Reasons why some of them are impossible.
     """
 
     tolerances: tuple[Tolerance, ...]
@@ -48,13 +48,13 @@ class Study:
 
     @classmethod
     def of(cls, trials: Trials, rows: Sequence[Mapping[str, Any]]) -> "Study":
-        """What the rows of some trials say, in the order of their items.
+        """Study from the rows of some trials, in the order of their items.
 
         Raises
         ------
         GeometryError
-            The camera cannot be measured as described, or with one deviation of an error, or too few of
-            those drawn.
+            If the camera cannot be measured as described, or with one deviation of an error, or if too few
+            of those drawn are possible.
         """
         for row in rows[: trials.steps]:
             if ERROR in row:
@@ -63,7 +63,7 @@ class Study:
         good = [row for row in taken if ERROR not in row]
         bad = tuple(str(row[ERROR]) for row in taken if ERROR in row)
         if len(good) < 2:
-            raise GeometryError(f"{len(bad)} of {len(taken)} cameras drawn cannot be, such as: {bad[0]}")
+            raise GeometryError(f"{len(bad)} of {len(taken)} cameras drawn are impossible, such as: {bad[0]}")
         given = {CAMERA, SEED, *(column(one.name, one.unit) for one in trials.tolerances)}
         headings = [heading for heading in rows[0] if heading not in given]
         found = (_outcome(heading, rows[: trials.steps], good) for heading in headings)
@@ -75,7 +75,7 @@ class Study:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the tolerances."""
+        """Names of the tolerances."""
         return tuple(one.name for one in self.tolerances)
 
     def rows(self) -> list[dict[str, Any]]:
@@ -100,10 +100,10 @@ class Study:
         return tuple(quantity for one in self.outcomes for quantity in _quantities(one))
 
     def notes(self) -> Iterator[str]:
-        """What to know, one sentence each."""
+        """Remarks, one sentence each."""
         if self.failures:
             yield (
-                f"{len(self.failures)} of {self.draws} cameras drawn cannot be and are left out of all "
+                f"{len(self.failures)} of {self.draws} cameras drawn are impossible and left out of all "
                 f"numbers, such as: {self.failures[0]}"
             )
         for one in self.outcomes:
@@ -127,7 +127,7 @@ def study(
     output: str | os.PathLike[str] | None = None,
     workers: int | cluster.Cluster = 1,
 ) -> Study:
-    """What tolerances do to a camera: a Monte Carlo of many beside first-order sensitivities.
+    """Monte Carlo study of tolerances: many random cameras beside first-order sensitivities.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def study(
     seed
         Of all that is drawn: the same one draws the same.
     output
-        Beside which a ledger lists what is done: killed at any time, the same call goes on where it was. None
+        Beside which a ledger lists what is done. Safe to interrupt: the same call resumes. None
         computes in this process.
     workers
         Processes, or a `lumigraph.cluster.Dask`, with an output.
@@ -186,7 +186,7 @@ def study(
 def _outcome(
     heading: str, steps: Sequence[Mapping[str, Any]], drawn: Sequence[Mapping[str, Any]]
 ) -> Outcome | None:
-    """Of one measure; None where the camera as described has no value."""
+    """Outcome of one measure; None where the camera as described has no value."""
     name, unit = unit_of(heading)
     first = np.array([np.nan if row.get(heading) is None else row[heading] for row in steps], float)
     sample = np.array([row[heading] for row in drawn if row.get(heading) is not None], float)

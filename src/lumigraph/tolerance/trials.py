@@ -1,4 +1,4 @@
-"""`Trials`: what is computed of a camera with tolerances, item by item, in any order and on any machine."""
+"""`Trials`: computations on a camera with tolerances, item by item, in any order and on any machine."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ MOST = 1_000_000
 """Cameras that are drawn at most."""
 
 VIEWS = "lenslets that see a point"
-"""Of cameras 2.0, in the place of the views that matched f-numbers would give."""
+"""Measure of cameras 2.0, in place of the views that matched f-numbers would give."""
 
 USUAL = (
     "focus shift", "depth error", "blur at the object", "lateral resolution", "views per axis",
@@ -34,10 +34,10 @@ USUAL = (
 """Measures that are taken where none are named."""
 
 OF_LENSLETS = ("lenslet focus shift", "light of a point")
-"""Those that are taken besides where lenslets differ from each other."""
+"""Additional measures where lenslets differ from each other."""
 
 OF_LEANING = ("corner focus shift", "corner depth error")
-"""Those that are taken besides where array or sensor lean."""
+"""Additional measures where array or sensor lean."""
 
 CAMERA, ERROR = "camera", "error"
 """Columns: which camera it is, and why there is none."""
@@ -73,7 +73,7 @@ class Trials:
         *,
         seed: int = 0,
     ) -> "Trials":
-        """Those of a camera.
+        """Trials of a camera.
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class Trials:
 
     @property
     def what(self) -> dict[str, Any]:
-        """What the work is, for a ledger."""
+        """Description of the work, for a ledger."""
         given = {one.name: [one.half, one.relative, one.shape] for one in self.tolerances}
         return {"camera": self.camera, "tolerances": given, "measure": list(self.names), "seed": self.seed}
 
@@ -134,14 +134,14 @@ class Trials:
         return [{"off": ""}, *sides, *({"draw": k} for k in range(draws))]
 
     def errors_of(self, item: Mapping[str, Any]) -> dict[str, float]:
-        """What is off in an item, in SI, by name."""
+        """Errors of an item, in SI, by name."""
         if "draw" in item:
             return drawn(self.tolerances, self.deviations, item["draw"], seed=self.seed)
         pairs = zip(self.tolerances, self.deviations, strict=True)
         return {one.name: item["side"] * size for one, size in pairs if one.name == item["off"]}
 
     def __call__(self, item: Mapping[str, Any]) -> Values:
-        """What is off, and the measures, or why no camera is so."""
+        """Errors and measures of an item, or the reason why there is no such camera."""
         errors = self.errors_of(item)
         about = f"draw {item['draw']}" if "draw" in item else _about(item)
         row: dict[str, Any] = {CAMERA: about}
@@ -158,7 +158,7 @@ class Trials:
         return Values(row | found)
 
     def _add_effects(self, found: dict[str, Any], name: str, side: int) -> None:
-        """What lenslets do that differ, each by one deviation, as independent errors add up."""
+        """Add the effects of lenslets that differ by one deviation each, as independent errors add up."""
         size = next(s for one, s in zip(self.tolerances, self.deviations, strict=True) if one.name == name)
         for measure, (effect, bend) in changes(self.meant, name, size, of_differing(self.meant)).items():
             for heading in found.keys() & {measure, *(column(measure, unit) for unit in ("m", "px"))}:
@@ -206,7 +206,7 @@ def _names(
     known: Sequence[str],
     tolerances: Sequence[Tolerance],
 ) -> tuple[str, ...]:
-    """The measures that are asked for."""
+    """The measures to compute, by name."""
     each = [one.name for one in tolerances if one.is_of_each]
     leans = any(one.name in (*LEANS, "array_bow") for one in tolerances)
     if asked is None:

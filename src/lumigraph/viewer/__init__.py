@@ -1,19 +1,11 @@
 """The viewer: a page in the browser, served on the loopback interface or written as one file.
 
-- `server`: what is served: a fixed table of resources behind a random token; knows nothing of light fields
-- `address`: the same address for the same file
-- `safety`: which requests are answered, and the headers of every answer
-- `exhibit`: what one page shows: views, raw image, focal stack, depth, volume
-- `opening`: a file, or a raw image with its calibration, as an exhibit
-- `parts`: an exhibit as a description (JSON) and arrays that are sent when they are asked for
-- `encoding`: arrays as bytes: as they are, losslessly smaller, or as pictures
-- `page`: the page's files, as a table to serve
-- `packing`: how arrays are kept in a page that is written
-- `single_file`: the same page as one file that works from disk
-- `pyramid`, `folder`: the same page as a folder for any web server, with pictures in several steps, in tiles
+- `server`, `address`, `safety`, `connections`: a table of resources behind a random token, safely served
+- `exhibit`, `opening`, `start`: the contents of a page, from files or raw images; its first picture
+- `parts`, `encoding`, `packing`: an exhibit as a description (JSON) and arrays, as bytes or pictures
+- `page`, `single_file`, `inline`, `static/`: the page as a table, as one file, in a notebook; its sources
+- `pyramid`, `folder`: the page as a folder for any web server, with pictures in several steps, in tiles
 - `designer`, `designer_parameters`, `designer_curves`, `designer_point`: a camera as sliders
-- `inline`: the page inside a notebook
-- `static/`: HTML, CSS, JavaScript modules and shaders, as they are
 """
 
 from lumigraph.viewer.address import Address, address_of

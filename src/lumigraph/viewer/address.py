@@ -17,12 +17,12 @@ _FIRST_PORT, _PORTS = 49152, 16384  # those that no service is registered for
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """Where a page is answered.
+    """Address of a page: token and port.
 
     Parameters
     ----------
     token
-        First part of every path: nobody guesses it who does not have the secret.
+        First part of every path, which only the holder of the secret can derive.
     port
         Tried first; any free one where it is taken.
     """
@@ -51,7 +51,7 @@ def address_of(paths: Sequence[Path], folder: Path | None = None) -> Address | N
 
 
 def _secret(folder: Path | None) -> bytes | None:
-    """Random bytes of the user, made when they are first needed; None where others could read them."""
+    """Random bytes of the user, created on first use; None where others could read them."""
     if folder is None:
         return None
     path = folder / "viewer.key"

@@ -30,13 +30,13 @@ class Connection(H11Protocol):
         self._watch()
 
     def on_response_complete(self) -> None:
-        """An answer is sent: the time for the next request begins."""
+        """Start the time limit of the next request, after an answer."""
         self._since = self.loop.time()
         super().on_response_complete()
 
     @property
     def waiting(self) -> bool:
-        """Whether the client has not yet sent a whole request."""
+        """True if the client has not yet sent a whole request."""
         return self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
 
     def _watch(self) -> None:

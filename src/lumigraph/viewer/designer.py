@@ -81,7 +81,7 @@ def designed(camera: Instrument) -> dict[str, Any]:
 
 
 def timed(camera: Instrument, dz: float) -> dict[str, Any]:
-    """The image of a point as a page needs it, with the seconds that it took."""
+    """Image of a point as a page shows it, with the seconds that it took."""
     started = time.perf_counter()
     answer = shown(camera.point_view(dz))
     return answer | {"seconds": time.perf_counter() - started}

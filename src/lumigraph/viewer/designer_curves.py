@@ -1,4 +1,4 @@
-"""What a camera trades for what, in closed forms: the same quantities over a range of magnifications."""
+"""Trade-offs of a camera in closed form: the same quantities over a range of magnifications."""
 
 import math
 from collections.abc import Callable

@@ -20,7 +20,7 @@ _LOSSLESS = 6  # zlib level
 
 @dataclass(frozen=True, slots=True)
 class Coding:
-    """How values become whole numbers: ``(value - offset) / scale``, of the type `kind`."""
+    """Mapping of values to whole numbers: ``(value - offset) / scale``, of the type `kind`."""
 
     kind: np.dtype
     scale: float = 1.0
@@ -41,7 +41,7 @@ class Coding:
 
     @property
     def is_exact(self) -> bool:
-        """Whether the numbers are the values."""
+        """True if the numbers are the values."""
         return (self.scale, self.offset) == (1.0, 0.0)
 
     def numbers(self, piece: np.ndarray) -> np.ndarray:

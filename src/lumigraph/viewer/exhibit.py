@@ -1,4 +1,4 @@
-"""What one page shows of one file."""
+"""Contents of a page that shows one file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ class Planes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exhibit:
-    """What one page shows of one file; what is None is not shown.
+    """Contents of one page for one file; what is None is not shown.
 
     Parameters
     ----------
@@ -66,13 +66,13 @@ class Exhibit:
     planes
         Focal stack, where there are no views.
     depth
-        Depth map, or a function that computes it when somebody wants to see it.
+        Depth map, or a function that computes it on demand.
     measure
         What the depths of that function are called, and their unit.
     volume
         Planes of space.
     facts
-        (what, value) to tell about the file.
+        (what, value) to show about the file.
     relative
         Whether the refocus factors have no meaning but the shift per view; see `comfortable`.
     metres
@@ -144,7 +144,7 @@ def focal_stack(views: LightField, count: int = 33) -> Planes:
 
 
 def depth_of(views: LightField) -> Callable[[], DepthMap] | None:
-    """Refocus factors of the middle view, measured when somebody wants to see them as `lumigraph depth` does.
+    """Function that measures refocus factors of the middle view on demand, as `lumigraph depth` does.
 
     None where there is nothing to measure: one view, or views that are too small.
     """

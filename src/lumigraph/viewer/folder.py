@@ -30,7 +30,7 @@ _ENTRIES = {"index.html", "app", "data"}
 
 @dataclass(frozen=True, slots=True)
 class Folder:
-    """What was written.
+    """Result of an export: folder, size and number of files.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def export_folder(
 
 
 def serve_folder(path: Path) -> Site:
-    """What a server answers from a folder that `export_folder` wrote: its files, listed once.
+    """Site of a folder that `export_folder` wrote: its files, listed once.
 
     Raises
     ------
@@ -169,7 +169,7 @@ class _Writer:
 
 @dataclass(frozen=True, slots=True)
 class _Tiles:
-    """Where the tiles of one exhibit go."""
+    """Writer of the tiles of one exhibit."""
 
     writer: _Writer
     number: int

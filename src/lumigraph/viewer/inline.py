@@ -18,7 +18,7 @@ from lumigraph.viewer.single_file import exported
 
 @dataclass(frozen=True, slots=True)
 class InlinePage:
-    """A page that a notebook shows in a frame of its own.
+    """A page that a notebook shows in a separate frame.
 
     Parameters
     ----------

@@ -61,7 +61,7 @@ class PatchRange:
 
     @classmethod
     def about(cls, patch: float, calibration: Calibration) -> "PatchRange":
-        """From some times smaller to some times larger than one."""
+        """Range from some times smaller to some times larger than one patch size."""
         checks.finite("patch", patch, "px")
         most = 0.98 * calibration.lattice.pitch
         sizes = np.linspace(abs(patch) / _PATCH_SPAN, min(abs(patch) * _PATCH_SPAN, most), _PATCHES)
@@ -69,7 +69,7 @@ class PatchRange:
 
     @classmethod
     def of(cls, camera: Rendered, seen: "PortraitSample") -> "PatchRange":
-        """Of all depths of a scene, as finely as diffraction at the lenslets leaves it."""
+        """Range over all depths of a scene, as finely as diffraction at the lenslets leaves it."""
         first, last = (camera.patch_at(dz) for dz in seen.depths)
         sizes = np.unique(np.linspace(first, last, _SIMULATED_PATCHES))
         largest = float(np.abs(sizes).max())
@@ -78,7 +78,7 @@ class PatchRange:
 
 @dataclass(frozen=True)
 class Origin(Given):
-    """What a raw image needs to become views or pictures.
+    """Files and values that turn a raw image into views or pictures.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ class Origin(Given):
 
     @property
     def is_known(self) -> bool:
-        """Whether it is known where micro-images stand."""
+        """True if the places of the micro-images are known."""
         return any(one is not None for one in (self.camera, self.calibration, self.white))
 
 
 def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | None = None) -> Exhibit:
-    """What a file, a folder of views or a camera's description shows.
+    """Exhibit of a file, a folder of views or a camera's description.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
 
 
 def of_views(name: str, views: LightField) -> Exhibit:
-    """A light field, with depth when it is asked for."""
+    """A light field, with depth on demand."""
     checks.finite_array(name, views.data, FormatError)
     views, relative = comfortable(views)
     return Exhibit(
@@ -270,7 +270,7 @@ def rendered(
 
 
 def is_camera(path: Path) -> bool:
-    """Whether a path is a camera's description, or names a bundled camera."""
+    """True if a path is a camera's description, or names a bundled camera."""
     if not path.exists():
         from lumigraph.instruments import catalogue
 
@@ -284,7 +284,7 @@ def is_camera(path: Path) -> bool:
 
 
 def _simulated(path: Path, tell: Progress) -> Exhibit:
-    """What a camera sees of the painted scene, whose layers lie at several depths."""
+    """Exhibit of a camera before the painted scene, whose layers lie at several depths."""
     from lumigraph import samples
     from lumigraph.instruments import load_camera
     from lumigraph.simulation import Incoherent, simulate
@@ -315,7 +315,7 @@ def _quick(camera: "AnyCamera") -> "AnyCamera":
 
 
 def _depth(camera: "AnyCamera") -> float:
-    """From the focused plane to the nearest and the farthest thing that a camera is shown [m]."""
+    """Distance from the focused plane to the nearest and the farthest part of the scene [m]."""
     known = {row.name: row.value for row in camera.quantities()}
     if "refocus range" in known:
         return 0.4 * known["refocus range"]

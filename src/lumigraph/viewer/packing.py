@@ -1,4 +1,4 @@
-"""How arrays are kept in a page that is written: without loss, or as pictures."""
+"""Encoding of arrays in a page that is written: without loss, or as pictures."""
 
 import numpy as np
 

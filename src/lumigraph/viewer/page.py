@@ -19,7 +19,7 @@ MODULES = (
     "rays.js", "sections.js", "models.js", "pane.js", "quilt.js", "histogram.js", "play.js", "saving.js",
     "webm.js", "film.js", "controls.js", "keys.js", "main.js",
 )  # fmt: skip
-"""In the order of their imports: a module comes after those it uses."""
+"""Modules in the order of their imports: a module comes after those it uses."""
 
 MEDIA = {
     ".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8",
@@ -28,7 +28,7 @@ MEDIA = {
 """Media types of the page's files by their endings."""
 
 Pack = Callable[[str, Parts, Coded], bytes]
-"""How an array travels: function of its name, what it belongs to, and its numbers."""
+"""Encoding of an array: function of its name, what it belongs to, and its numbers."""
 
 
 @cache
@@ -43,7 +43,7 @@ def site(exhibits: Sequence[Exhibit]) -> Site:
 
 
 def site_of(parts: Sequence[Parts], pack: Pack = lambda name, part, coded: coded.as_bytes()) -> Site:
-    """As `site`, of exhibits that are described already."""
+    """Site of exhibits that are described already; see `site`."""
     resources = {"": Resource(MEDIA[".html"], static("index.html").encode())}
     for name in (*MODULES, "style.css"):
         resources[f"app/{name}"] = Resource(MEDIA[PurePath(name).suffix], static(name).encode())
@@ -55,7 +55,7 @@ def site_of(parts: Sequence[Parts], pack: Pack = lambda name, part, coded: coded
 
 
 def about(parts: Sequence[Parts]) -> dict[str, Any]:
-    """What the page must know before any array."""
+    """Description of the exhibits, which the page reads before any array."""
     return {"version": version("lumigraph"), "exhibits": [part.about for part in parts]}
 
 

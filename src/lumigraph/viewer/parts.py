@@ -1,4 +1,4 @@
-"""An exhibit as a description (JSON) and arrays that are sent when they are asked for."""
+"""An exhibit as a description (JSON) and arrays that are sent on request."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -53,7 +53,7 @@ class Parts:
 
     @classmethod
     def of(cls, exhibit: Exhibit, *, written: bool = False) -> "Parts":
-        """Everything of an exhibit."""
+        """All parts of an exhibit."""
         facts = [list(fact) for fact in exhibit.facts]
         parts = cls({"name": exhibit.name, "facts": facts}, written=written)
         parts._add_views(exhibit)

@@ -73,7 +73,7 @@ class Pyramid:
         return max(1, min(self.shape[0], PACK // size))
 
     def about(self) -> dict[str, Any]:
-        """What the page must know, as JSON can hold it."""
+        """Description for the page, as JSON can hold it."""
         return {
             "shape": list(self.shape), "coarsest": self.coarsest, "tile": self.tile, "pack": self.pack,
         }  # fmt: skip
@@ -81,7 +81,7 @@ class Pyramid:
     def write(
         self, data: np.ndarray, write: Write, valid: np.ndarray | None = None, progress: Progress = silent
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Write all tiles; gives the coarsest pictures' numbers, and which of them are valid.
+        """Write all tiles; returns the coarsest pictures' numbers, and which of them are valid.
 
         Parameters
         ----------

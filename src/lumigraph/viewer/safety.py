@@ -1,4 +1,4 @@
-"""Which requests are answered, and the headers of every answer."""
+"""Checks of requests, and the headers of every answer."""
 
 import hmac
 from collections.abc import Iterable, Mapping
@@ -29,7 +29,7 @@ def hosts(port: int) -> frozenset[str]:
 
 
 def refusal(headers: Iterable[tuple[bytes, bytes]], known: frozenset[str]) -> str | None:
-    """Why a request is refused before its path is looked at; None where it is not.
+    """Reason to refuse a request before its path is looked at; None where there is none.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def body_size(headers: Mapping[str, str]) -> int | None:
 
 
 def inside(path: str, token: str) -> str | None:
-    """What follows `/token/` in a path; None where the token is missing or wrong."""
+    """Rest of a path after `/token/`; None where the token is missing or wrong."""
     first, slash, rest = path.removeprefix("/").partition("/")
     right = hmac.compare_digest(first.encode("utf-8", "replace"), token.encode())
     return rest if right and slash and path.startswith("/") else None

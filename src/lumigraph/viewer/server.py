@@ -26,14 +26,14 @@ Call = Callable[[dict[str, Any]], Any]
 
 
 class Resource:
-    """Something to send: bytes, or a function that gives them.
+    """Content to send: bytes, or a function that returns them.
 
     Parameters
     ----------
     media_type
         Such as "text/html; charset=utf-8".
     content
-        Bytes, or a function that is called in a thread of its own when they are first asked for.
+        Bytes, or a function that is called in a separate thread at the first request.
     keep
         Whether the function's bytes are kept for the next request.
     """
@@ -62,7 +62,7 @@ class Resource:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """What a server answers.
+    """Contents that a server answers with: resources and calls.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def _listener(host: str, port: int) -> socket.socket:
 
 
 def _started(work: Callable[[], Any]) -> "Future[Any]":
-    """What `work` will give, from a thread that ends with the command, even in the middle of its work."""
+    """Future result of `work`, from a thread that ends with the command, even in the middle of its work."""
     future: Future[Any] = Future()
 
     def run() -> None:

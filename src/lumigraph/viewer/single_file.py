@@ -22,7 +22,7 @@ LARGEST = 400 << 20
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """What was written.
+    """Result of an export: path and sizes [bytes].
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def document(description: str, blobs: dict[str, str]) -> str:
 
 
 def bundle() -> str:
-    """All modules as one script: each in a function of its own, which gives what the module exports."""
+    """All modules as one script: each in a function that returns the module's exports."""
     return "\n" + "\n".join(_enclosed(static(name)) for name in MODULES)
 
 

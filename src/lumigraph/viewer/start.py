@@ -1,4 +1,4 @@
-"""What a page opens with: focus on the subject, and the picture that shows it."""
+"""Opening state of a page: focus on the subject, and the picture that shows it."""
 
 import math
 

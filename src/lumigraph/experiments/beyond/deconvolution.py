@@ -21,10 +21,10 @@ PARTS = (0.1, 0.3, 0.42, 0.6, 0.75, 0.9, 1.1)
 """Frequencies over the main lens's cut-off; the rendered picture ends at 0.5 where m = 0.5."""
 
 AMPLITUDE = 0.13
-"""Of each frequency: all together stay below the mean."""
+"""Amplitude of each frequency: all together stay below the mean."""
 
 ELECTRONS = 9000.0
-"""Of an even scene, in a pixel in the middle of a micro-image."""
+"""Electrons of an even scene in a pixel in the middle of a micro-image."""
 
 _MAGNIFICATION = 0.5
 _OVERSAMPLING = 1.25  # of the main-lens image above twice its cut-off
@@ -85,7 +85,7 @@ class _Bench:
         )
 
     def pictures(self, raw: np.ndarray) -> dict[str, tuple[np.ndarray, Grid]]:
-        """What each way makes of a raw image, and where its samples stand in the object."""
+        """Picture of a raw image by each method, and the grid of its samples in the object."""
         calibration, patch = self.camera.calibration, self.camera.patch
         image = RawImage(raw, self.camera.pixels.pixel_pitch)
         place = rendered_grid(calibration, patch)
@@ -126,7 +126,7 @@ def _mean(bench: _Bench, picture: np.ndarray, grid: Grid) -> float:
 
 
 def _raw_modulation(bench: _Bench) -> np.ndarray:
-    """How much light each frequency moves on the sensor, over the light: what there is to be deconvolved."""
+    """Modulation on the sensor by each frequency, over the light: what there is to be deconvolved."""
     even = np.maximum(bench.operator.forward(np.ones(bench.grid.shape, np.float32)), 0)
     n = even.shape[0]
     inner = slice(n // 4, 3 * n // 4)

@@ -1,4 +1,4 @@
-"""The microscope of these experiments, its noise, and the way back from its raw images."""
+"""The microscope of these experiments, its noise, and the deconvolution of its raw images."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,10 +10,10 @@ from lumigraph.deconvolution.filters import widths_of
 from lumigraph.instruments import LightFieldMicroscope
 
 HAZE = 1.0
-"""Photons that every pixel sees without an object."""
+"""Photons of the background on every pixel."""
 
 PIXELS = 15
-"""Of a lenslet, along each side."""
+"""Pixels of a lenslet, along each side."""
 
 
 def scope(count: int) -> LightFieldMicroscope:

@@ -1,4 +1,4 @@
-"""What a light-field microscope resolves at each depth: beads and a vesicle, with photon noise."""
+"""Resolution of a light-field microscope over depth: beads and a vesicle, with photon noise."""
 
 import math
 from typing import Any
@@ -13,13 +13,13 @@ from lumigraph.plots.curves import curves
 from lumigraph.units import um
 
 DEPTHS = (-50 * um, -25 * um, -12 * um, 0.0, 12 * um, 25 * um, 50 * um)
-"""Of the beads, in the full run."""
+"""Depths of the beads, in the full run."""
 
 STEP = 2 * um
 PLANES = 11
 SAMPLES = 11
 PHOTONS = 2e5
-"""Of a bead, on the sensor."""
+"""Photons of a bead, on the sensor."""
 
 SHELL = 18 * um
 """Radius of the vesicle."""
@@ -55,8 +55,9 @@ def run(context: Context) -> Outcome:
 def bead(
     bench: LightFieldMicroscope, model: LightFieldMicroscope, dz: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Of a point seen by `bench` and reconstructed by `model`: widths at half maximum (lateral, axial) [m],
-    depth [m], and its light over the true one.
+    """Image of a point by `bench`, reconstructed by `model`, in four numbers.
+
+    Widths at half maximum (lateral, axial) [m], depth [m], and its light over the true one.
     """
     depths = tuple(dz + (k - PLANES // 2) * STEP for k in range(PLANES))
     operators = [

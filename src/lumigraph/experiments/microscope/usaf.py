@@ -12,10 +12,10 @@ from lumigraph.scene import Slice, targets
 from lumigraph.units import um
 
 DEPTHS = (-50 * um, -25 * um, -12 * um, 0.0, 12 * um, 25 * um, 50 * um)
-"""Of the target, in the full run."""
+"""Depths of the target, in the full run."""
 
 PHOTONS = 300.0
-"""Of a bright place, on each pixel."""
+"""Photons of a bright place, on each pixel."""
 
 RESOLVED = 0.2
 """Least contrast of bars that count as resolved."""

@@ -1,14 +1,7 @@
 """The 2f system as a filter, and random-phase snapshots of a resolution target through it.
 
-In the Fresnel approximation the intensity in the image of a 2f system is exactly
-
-    |h * (U exp(iπ r²/(λz)))|²,
-
-h the transform of the pupil, so that one snapshot costs one forward transform and a small inverse one: of the
-object's frequencies only those inside the pupil, D/(2λz) = 12.5 /mm, arrive. The image is sampled just
-finely enough for its intensity, which holds twice these frequencies. Light that converges on the lens, as
-behind a condenser, cancels the phase; parallel light does not, and the more of it is coherent the more misses
-the lens from the border of the field.
+In the Fresnel approximation the intensity is |h * (U exp(iπ r²/(λz)))|², h the transform of the pupil: one
+snapshot costs one forward transform and a small inverse one. docs/theory/experiments.md has the rest.
 """
 
 from collections.abc import Callable
@@ -27,11 +20,11 @@ from lumigraph.scene import Slice, targets
 from lumigraph.units import mm
 
 SAMPLES, WINDOW = 1765, 10 * mm
-"""Those of the thesis' section 3.5.1."""
+"""Sampling of the thesis' section 3.5.1."""
 QUICK_SAMPLES = 882
 """Half of the window at the same pitch: the same object detail, masks and speckle."""
 INCOHERENCE = 0.14
-"""C/N where the thesis sees its asymptote."""
+"""C/N at which the thesis finds its asymptote."""
 
 Light = Callable[[Grid, np.random.Generator], np.ndarray]
 """Complex illumination (ny, nx) of an object, of random phase."""
@@ -54,7 +47,7 @@ class Imager:
 
     @cached_property
     def grid(self) -> Grid:
-        """Where the object's samples stand."""
+        """Grid of the object's samples."""
         return Grid.square(self.samples, WINDOW / SAMPLES)
 
     @cached_property
@@ -139,7 +132,7 @@ def snapshots(imager: Imager, light: Light, count: int, seed: int) -> np.ndarray
 
 @dataclass(frozen=True)
 class Errors:
-    """What a set of snapshots says about any number of them, relative to the reference's rms.
+    """Expected error of any number of snapshots, relative to the reference's rms.
 
     `bias` is the error that is left of infinitely many, `speckle` the standard deviation of one snapshot:
     M of them have rms² = bias² + speckle²/M.
@@ -150,7 +143,7 @@ class Errors:
 
     @classmethod
     def of(cls, halves: np.ndarray, count: int, reference: np.ndarray) -> "Errors":
-        """From sums of both halves of `count` snapshots: speckle is independent, bias is common."""
+        """Errors from sums of both halves of `count` snapshots: speckle is independent, bias is common."""
         means = halves / (count / 2)
         scale = (reference * means.mean(0)).sum() / np.square(means.mean(0)).sum()
         first, second = scale * means - reference

@@ -9,7 +9,7 @@ from lumigraph.elements import ThinLens
 from lumigraph.propagation import propagate
 
 FOCAL, PITCH, IMAGE = 5.2e-3, 150e-6, 0.12
-"""Of Tables 5.1, 5.2 and 6.1: f_µ, p and z2 [m]."""
+"""Values of Tables 5.1, 5.2 and 6.1: f_µ, p and z2 [m]."""
 
 _HALF_CONTRAST = 0.40397  # of the cut-off, where the MTF of a round lens is 1/2: Goodman, equation 6-31
 
@@ -32,7 +32,7 @@ def measured(a: float, b: float, wavelength: float, samples: int = 300) -> tuple
 
 
 def traced(a: float, b: float, diameter: float) -> dict[str, float]:
-    """What paraxial rays say: blur and magnification on the sensor, lenslets that a point lights, filling.
+    """Paraxial values: blur and magnification on the sensor, lenslets that a point lights, filling.
 
     From the rim of the main lens through a point of its image to the lenslets and the sensor.
     """

@@ -47,7 +47,7 @@ def point_image(name: str, diameter: float = DIAMETER, pinhole: float = 0.0) -> 
     name
         One of `METHODS`.
     diameter
-        Of the lens [m].
+        Diameter of the lens [m].
     pinhole
         Diameter of the source [m]; 0 for one sample.
     """

@@ -101,7 +101,7 @@ def _displacement(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def _correlation(camera: PlenopticCamera, picture: np.ndarray, grid: Grid, scene: Scene) -> float:
-    """Pearson's, with the object averaged over what each lenslet sees of it."""
+    """Pearson's correlation with the object, averaged over each lenslet's footprint."""
     part = _slice(scene)
     scale = camera.magnification
     rows, columns = (

@@ -85,7 +85,7 @@ def _rows(context: Context, camera: FocusedPlenopticCamera, raw: RawImage) -> li
 
 
 def _spread(camera: FocusedPlenopticCamera, places: int = 4) -> float:
-    """Diameter of the disc of lenslets that see a point: 4 standard deviations of an even disc.
+    """Diameter of the disc of lenslets that image a point: 4 standard deviations of an even disc.
 
     Sorting light by lenslets adds a variance of 1/12, in the mean of all places of the point.
     """

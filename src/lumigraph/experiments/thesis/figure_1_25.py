@@ -87,7 +87,7 @@ def _covered(camera: FocusedPlenopticCamera, place: float) -> int:
 
 
 def _rows(samples: list[tuple[np.ndarray, np.ndarray, np.ndarray]], place: float, covered: int) -> list[Row]:
-    """Where each lenslet that sees the point says it is."""
+    """Position of the point according to each lenslet that receives its light."""
     total = max(light.sum() for _, _, light in samples)
     seen = sum(light.sum() > _SEEN * total for _, _, light in samples)
     places = []
@@ -140,7 +140,7 @@ def _scattered(camera: FocusedPlenopticCamera, samples: list) -> np.ndarray:
 
 
 def _rendered(samples: list) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Light of the pixels of all lenslets, summed by the place that they see [µm]."""
+    """Light of the pixels of all lenslets, summed by their place in the object [µm]."""
     edges = np.linspace(-250, 250, 61)
     curves = {}
     for pixels, name in zip(samples, ("red point", "green point"), strict=True):

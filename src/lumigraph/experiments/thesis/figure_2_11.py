@@ -84,6 +84,6 @@ def power_in_focus(radius: float) -> float:
 
 
 def _first_wrap(x: np.ndarray, wrapped: np.ndarray) -> float:
-    """Where the wrapped phase first jumps from -π to π."""
+    """Place where the wrapped phase first jumps from -π to π."""
     jump = int(np.flatnonzero(np.diff(wrapped) > np.pi)[0])
     return float((x[jump] + x[jump + 1]) / 2)

@@ -11,7 +11,7 @@ from lumigraph.units import mm, nm, um
 
 WAVELENGTH = 633 * nm
 GRID = Grid.square(500, 1.6 * um)
-"""Of 0.8 mm: aliasing begins at N p²/λ = 2.02 mm, as in the thesis' figure; its own grid is not given."""
+"""Grid of 0.8 mm: aliasing begins at N p²/λ = 2.02 mm, as in the thesis, which does not give its grid."""
 DISTANCES = (1 * mm, 2 * mm, 10 * mm, 20 * mm)
 
 WHY = (
@@ -64,7 +64,7 @@ def run(context: Context) -> Outcome:
 
 
 def _unaliased(f: np.ndarray, distance: float) -> Row:
-    """Where no frequency aliases: the largest step of the phase, below π."""
+    """Largest step of the phase over π: below 1, no frequency aliases."""
     sine = WAVELENGTH * (f[-1] + f[-2]) / 2
     step = 2 * distance * WAVELENGTH * (f[1] - f[0]) * (f[-1] + f[-2]) / 2 / np.sqrt(1 - sine**2)
     return Row(
@@ -74,7 +74,7 @@ def _unaliased(f: np.ndarray, distance: float) -> Row:
 
 
 def _steps(f: np.ndarray, distance: float) -> np.ndarray:
-    """How far the phase of H turns from each frequency to the next [rad], unwrapped on 64 times as many."""
+    """Phase steps of H between frequencies [rad], unwrapped on 64 times as many."""
     fine = np.linspace(f[0], f[-1], 64 * (len(f) - 1) + 1)
     phase = np.unwrap(np.angle(transfer_function(np.zeros(1), fine, distance, WAVELENGTH)[0]))
     return np.abs(np.diff(phase[::64]))

@@ -11,7 +11,7 @@ from lumigraph.experiments.thesis import _two_f as two_f
 from lumigraph.plots import curves, images
 
 COUNT = 350
-"""Snapshots after which the thesis sees no gain."""
+"""Snapshots after which the thesis finds no gain."""
 STEP = 50
 """Snapshots of one part, which an interrupted run keeps."""
 QUICK_MASKS = 50

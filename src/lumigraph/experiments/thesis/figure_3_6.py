@@ -70,7 +70,7 @@ def run(context: Context) -> Outcome:
 
 
 def _cutoff_row(name: str, frequencies: np.ndarray, values: np.ndarray) -> Row:
-    """Where the curve falls to 1 %; half a frequency sample of 100 /m is allowed."""
+    """Frequency at which the curve falls to 1 %; half a frequency sample of 100 /m is allowed."""
     return Row(
         f"frequency of 1 % contrast, {name}",
         cutoff(frequencies, values, LEVEL),

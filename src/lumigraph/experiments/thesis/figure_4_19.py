@@ -68,7 +68,7 @@ def _raw(context: Context, camera: PlenopticCamera) -> RawImage:
 def _rows(
     camera: PlenopticCamera, views: LightField, pictures: dict[str, np.ndarray], name: str
 ) -> list[Row]:
-    """Where a point is, and how much brighter it is when the picture is refocused on it."""
+    """Place of a point, and how much brighter it is when the picture is refocused on it."""
     y, x, dz = POINTS[name]
     scale = camera.separation / (camera.object_distance + dz)
     place = np.array([y, x]) * scale

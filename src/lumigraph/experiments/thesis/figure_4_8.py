@@ -77,7 +77,7 @@ def _aperture_rows(camera: PlenopticCamera, views: LightField) -> list[Row]:
 
 
 def _view_rows(camera: PlenopticCamera, views: LightField) -> list[Row]:
-    """How far a defocused point moves between points of view (4.5), over ray optics' (1 - α') Δu."""
+    """Shift of a defocused point between points of view (4.5), over ray optics' (1 - α') Δu."""
     u, x = views.aperture.x, views.lenslets.x
     first, last = len(u) // 4, len(u) - 1 - len(u) // 4
     left, right = (np.maximum(views.data[:, k].mean((0, 1)), 0) for k in (first, last))

@@ -105,7 +105,7 @@ def _low_pass(profile: np.ndarray, pitch: float) -> np.ndarray:
 
 
 def _lenslet_mtf(frequency: float, m: float) -> float:
-    """Of a round, ideal lenslet at a frequency of the main-lens image: Goodman, equation 6-31."""
+    """MTF of a round, ideal lenslet at a frequency of the main-lens image: Goodman, equation 6-31."""
     found = camera(m, 3)
     part = frequency / rendered_cutoff(found.wavelength, found.lenslets.pitch, m, found.lenslet_distance)
     return 2 / math.pi * (math.acos(part) - part * math.sqrt(1 - part**2))

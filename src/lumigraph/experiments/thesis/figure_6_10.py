@@ -18,13 +18,13 @@ from lumigraph.scene import targets
 from lumigraph.simulation import simulate
 
 _TURN, _OFF = math.radians(0.3), -4.0
-"""Of the lenslets; and how much farther each micro-image is taken from its own place than the last [px]."""
+"""Rotation of the lenslets; extra distance of each micro-image from the last one [px]."""
 
 _SAMPLES, _NEAR = 41, 3
-"""Of the picture per lenslet; and lenslets from the axis at which patches are still in their micro-images."""
+"""Samples of the picture per lenslet; lenslets from the axis at which patches are still in micro-images."""
 
 _THRESHOLD, _STOP = 0.5, 0.8
-"""Of the brightest; and the main lens' diameter over that whose micro-images touch: they need gaps."""
+"""Part of the brightest; and the main lens' diameter over that whose micro-images touch: they need gaps."""
 
 
 @experiment(
@@ -110,7 +110,7 @@ def lit_middles(profile: np.ndarray) -> np.ndarray:
 
 
 def _before(places: np.ndarray, middle: int) -> int:
-    """How many places lie before the one in the middle."""
+    """Index of the place nearest to the middle."""
     return int(np.abs(places - middle).argmin())
 
 
@@ -124,7 +124,7 @@ def stretched(calibration: Calibration, off: float) -> Calibration:
 
 
 def _seam_rows(pictures: dict[str, np.ndarray], step: float) -> list[Row]:
-    """Of pictures whose brightness is even; `step` is how much farther each patch is taken [samples]."""
+    """Rows on pictures of even brightness; `step` is how much farther each patch is taken [samples]."""
     seen, right = pictures["wrong"], pictures["right"]
     tiles = [np.floor((np.arange(n) - n // 2) / _SAMPLES + 0.5) for n in right.shape]
     places = np.meshgrid(*(np.arange(len(k)) - step * k for k in tiles), indexing="ij")

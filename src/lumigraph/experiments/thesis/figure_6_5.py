@@ -1,4 +1,4 @@
-"""Figure 6.5: white images of misaligned lenslets, and what a diagnosis says of each."""
+"""Figure 6.5: white images of misaligned lenslets, and the diagnosis of each."""
 
 import math
 
@@ -87,5 +87,5 @@ def _rows(name: str, found: Diagnosis, intended: MisplacedCamera) -> list[Row]:
 
 
 def _short(report: str) -> str:
-    """The first fault, without what to do about it."""
+    """Text of the first fault, without the remedy."""
     return report.splitlines()[0].split(":")[0].replace(", ", ",\n", 1)

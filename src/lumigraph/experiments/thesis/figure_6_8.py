@@ -21,7 +21,7 @@ from lumigraph.simulation import simulate
 MAGNIFICATIONS = (0.5, 0.4, 0.3, 0.25)
 
 GROUPS = (2, 3)
-"""Of the target: 4 to 14 line pairs per mm, on both sides of the cut-offs."""
+"""Groups of the target: 4 to 14 line pairs per mm, on both sides of the cut-offs."""
 
 
 @experiment(

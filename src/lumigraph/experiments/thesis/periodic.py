@@ -1,20 +1,11 @@
-r"""Exact raw images of lined objects, without speckle: the lenslets' periodicity does the work.
+"""Exact raw images of lined objects, without speckle, by the periodicity of the lenslets.
 
-Random phases would need 10^4 snapshots for 1 %. Instead mutually incoherent points are summed exactly,
-which is cheap for a grating, for three reasons that hold under the Fresnel approximation:
+Mutually incoherent points are summed; n points per lenslet and axis have only n² different images, moved by
+whole periods. docs/theory/experiments.md has the reasons and Talanov's transformation, which puts the period
+on whole samples. Coordinates are those of the upright raw image: an object at x appears around the lenslet at
+x L/z1.
 
-- The intensity on the sensor is band-limited in the object coordinate, at D/(λ z1): points spaced more
-  closely than λ z1/(2D) stand for a continuous object that is low-passed there.
-- Moving a point by p z1/L moves its intensity on the sensor by exactly p (1 + b/L). So n points per lenslet
-  and axis have only n² different images, each computed on a window of a few lenslets.
-- An object that does not vary along y has a raw image of period p (1 + b/L) along y: the images of all
-  points of a column are folded into one lenslet's height.
-
-Talanov's transformation makes the periodicity exact on the samples: the phase exp(iπx²/(λL)) is left out at
-the lenslets, b becomes bL/(L + b), and the sensor is a factor 1 + b/L larger afterwards.
-
-V. I. Talanov, JETP Lett. 11, 199 (1970). Coordinates are those of the upright raw image: an object at x
-appears around the lenslet at x L/z1.
+V. I. Talanov, JETP Lett. 11, 199 (1970).
 """
 
 import math
@@ -47,7 +38,7 @@ def main_lens_amplitude(
     Parameters
     ----------
     camera
-        Its main lens, wavelength and focused distance.
+        Main lens, wavelength and focused distance.
     y, x
         Places in the plane, relative to where the chief ray of the point meets it [m].
     separation
@@ -76,7 +67,7 @@ def line_spread(camera: Camera, x: np.ndarray, separation: float, dz: float = 0.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinedCamera:
-    """What a camera makes of bright lines along y, one lenslet high.
+    """Raw images of bright lines along y, one lenslet high, before a camera.
 
     Parameters
     ----------
@@ -85,7 +76,7 @@ class LinedCamera:
     dz
         Depth of the object from the focused plane [m].
     samples
-        Of the sensor per lenslet, an odd number.
+        Samples of the sensor per lenslet, an odd number.
     classes
         Points per lenslet, an odd number.
     spreads
@@ -147,17 +138,17 @@ class LinedCamera:
 
     @property
     def pixel_pitch(self) -> float:
-        """Of the raw image [m]."""
+        """Pixel pitch of the raw image [m]."""
         camera = self.camera
         return camera.lenslets.pitch * (1 + camera.lenslet_distance / camera.separation) / self.samples
 
     @property
     def patch(self) -> float:
-        """Of the raw image at the object's depth [px]; signed."""
+        """Patch of the raw image at the object's depth [px]; signed."""
         return self.camera.patch_at(self.dz) * self.camera.pixels.pixel_pitch / self.pixel_pitch
 
     def calibration(self, raw: RawImage) -> Calibration:
-        """Where the micro-images stand."""
+        """Calibration of the micro-images."""
         ny, nx = raw.shape
         lattice = Lattice.square(self.samples, origin=(ny // 2, nx // 2))
         none, camera = np.zeros((0, 2)), self.camera

@@ -1,4 +1,4 @@
-"""What the experiments of chapter 5 share: its cameras, and images of points behind them.
+"""Cameras of the experiments of chapter 5, and images of points behind them.
 
 The lenslets are round, as the thesis takes them to be (2.44 λ F#). The wavelength is that of the helium-neon
 laser, 632.8 nm: with it the printed formulas give the numbers of Tables 5.3 and 5.4.
@@ -46,7 +46,7 @@ class PointImage:
     Parameters
     ----------
     camera
-        That saw them.
+        Camera of the images.
     main, main_grid
         Main-lens image (y, x), and where its samples stand [m].
     raw
@@ -87,7 +87,7 @@ class PointImage:
 
     @property
     def micro_image(self) -> tuple[np.ndarray, Grid]:
-        """What the lenslet on the axis makes of a point there, and its place in the main-lens image [m].
+        """Image of a point on the axis by the lenslet there, and its grid in the main-lens image [m].
 
         It holds the rendered picture's point image before it is cut into patches. The other lenslets are
         dark: what they send across their borders would be taken for frequencies beyond the lenslet's cut-off.

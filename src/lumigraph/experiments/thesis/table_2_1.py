@@ -1,4 +1,4 @@
-"""What each propagation method can do, measured."""
+"""Measured abilities of each propagation method."""
 
 import time
 import warnings

@@ -1,4 +1,4 @@
-"""Table 4.1: the plenoptic camera 1.0 of chapter 4, and what it does with a point in focus."""
+"""Table 4.1: the plenoptic camera 1.0 of chapter 4, and its image of a point in focus."""
 
 import numpy as np
 from scipy.special import j1

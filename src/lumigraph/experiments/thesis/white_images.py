@@ -20,9 +20,9 @@ class MisplacedCamera(FocusedPlenopticCamera):
     Parameters
     ----------
     sensor_shift
-        Of the sensor away from the lenslets [m].
+        Shift of the sensor away from the lenslets [m].
     lenslet_shift
-        Of the lenslets towards the sensor [m].
+        Shift of the lenslets towards the sensor [m].
     """
 
     sensor_shift: float = 0.0
@@ -40,7 +40,7 @@ class MisplacedCamera(FocusedPlenopticCamera):
 
 
 def matched_diameter(found: FocusedPlenopticCamera) -> float:
-    """Of the main lens whose micro-images touch: as wide as their pitch, p (L + b)/b [m]."""
+    """Main-lens diameter whose micro-images touch: as wide as their pitch, p (L + b)/b [m]."""
     b = found.lenslet_distance
     return found.lenslets.pitch * (found.separation + b) / b
 
