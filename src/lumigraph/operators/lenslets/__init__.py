@@ -7,8 +7,8 @@ camera's numbers, with nothing written in place, by the functions of an array li
 - `illuminated`: cells that a point lights; `sampled_camera`, how finely all is sampled before
   a point; `exact_camera`, beyond the paraxial; `no_lenslets`; `cameras`, which of them a camera is
 - `main_lens`: the wave in the main lens, whose stop is sampled with smooth edges
-- lenslets: `square`, alike; `individual`, each its own; `any_shape`, by `line_matrices`; `exact_square`, beyond
-  the paraxial; `models`, which of them an array has
+- lenslets: `square`, alike; `individual`, each its own; `any_shape`, by `line_matrices`; `exact_square`,
+  beyond the paraxial; `models`, which of them an array has
 - `point_images`: raw images with derivatives between cameras; `gradient`, what these come to; `moving_point`,
   derivatives by a point's place
 """

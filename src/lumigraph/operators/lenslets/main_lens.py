@@ -2,8 +2,8 @@ r"""Wave of a point of light in the main lens, on few samples across it, however
 
 Light near the image follows from samples of the wave if these stand close enough, but a stop's sharp edge has
 all frequencies: samples that are grey in proportion to their open area are right to first order in their
-pitch alone. Here the stop's edge is smoothed by a kernel whose spectrum is 1 wherever light is followed, and 0
-where the samples' spectrum repeats, so that no sampling error is left (`band` has it along one axis). What a
+pitch alone. Here the stop's edge is smoothed by a kernel whose spectrum is 1 wherever light is followed, and
+0 where the samples' spectrum repeats, so that no sampling error is left (`band` has it along an axis). What a
 stop of radius R lets through at a distance r from its middle is
 
 .. math:: g(r) = 2\pi R \int \hat K(u) \, J_1(2\pi R u) \, J_0(2\pi r u) \, du.
