@@ -7,8 +7,8 @@ In lengths of a lenslet's pitch p, with ω on the lenslet and σ from its middle
           \quad a = \frac{p^2}{\lambda b}, \quad c = \frac{p^2}{\lambda f}
 
 with the telecentric distance b, by Gauss-Legendre quadrature between its edges. Nodes, samples and the
-light's own samples are frozen in pitches, so that a camera's numbers are a and c alone, and where fill factors differ
-the nodes.
+light's own samples are frozen in pitches, so that a camera's numbers are a and c alone, and the nodes where
+fill factors differ.
 """
 
 import math
