@@ -6,7 +6,6 @@ import pytest
 import lumigraph as lg
 from lumigraph.information.points import CameraSource, MicroscopeSource, PupilSource, source
 from lumigraph.operators.lenslets.any_shape import AnyShape
-from lumigraph.operators.point_light import paraxial_light
 
 UM = 1e-6
 PIXELS = 12
@@ -117,13 +116,6 @@ def _by_differences(points, place):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("lumigraph.information.points.has_changes", lambda camera: False)
         return points.lit(place, checked=True)
-
-
-def test_light_at_a_points_image_itself_does_not_change_across():
-    optics = lg.load_camera("thesis-plenoptic-2-m050").optics()
-    down, across, deeper = paraxial_light(optics, 0.122, 1e-4).changes(np.zeros(1), np.array([0.0, 1e-9]))
-    assert down[0, 0] == across[0, 0] == 0
-    assert deeper[0, 0] == pytest.approx(deeper[0, 1], rel=1e-6)
 
 
 def test_depths_share_what_lenslets_do_to_light(monkeypatch):
