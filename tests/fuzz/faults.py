@@ -301,7 +301,7 @@ def kept_files() -> dict[str, dict[str, np.ndarray]]:
     """What a camera, a microscope, a deconvolution and an experiment really keep."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        os.environ["lumigraphCACHE"] = str(folder)
+        os.environ["LUMIGRAPH_CACHE"] = str(folder)
         camera = lg.FocusedPlenopticCamera.from_catalogue("thesis-plenoptic-2-m050")
         camera.replace(lenslets={"count": (3, 3)}).operator(accuracy=1e-2)
         microscope = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(lenslets={"count": (3, 3)})

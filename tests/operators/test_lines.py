@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import cameras
-from lumigraph.operators.lenslets import line_parts, lines
-from lumigraph.operators.lenslets.lines import LineRelay
+from lumigraph.operators.lenslets import individual, line_matrices
+from lumigraph.operators.lenslets.any_shape import AnyShape
 from lumigraph.operators.lenslets.points import points_image
 from lumigraph.operators.lenslets.relay import RelaySet
 from lumigraph.operators.sampling.optics import Optics
@@ -21,21 +21,21 @@ POINT = Points(np.array([[0.1 * mm, -0.05 * mm, 1 * mm]]), np.ones(1))
 @pytest.fixture
 def followed(monkeypatch):
     """Numbers of lenslets around the cells that a point lights, and of those that are followed."""
-    numbers, of = [], LineRelay.lit
+    numbers, of = [], AnyShape.lit
 
-    def counted(self, light, rows, columns):
-        found = list(of(self, light, rows, columns))
-        numbers.append((len(self._around(rows, columns)), sum(map(len, found))))
+    def counted(self, light, cells):
+        found = of(self, light, cells)
+        numbers.append((len(self._around(*cells)), sum(map(len, found))))
         return found
 
-    monkeypatch.setattr(LineRelay, "lit", counted)
+    monkeypatch.setattr(AnyShape, "lit", counted)
     return numbers
 
 
 def test_lenslets_that_a_point_leaves_dark_are_not_followed(followed, monkeypatch):
     camera = WIDE.replace(lenslets={"pitch": 0.3 * mm})
     few = points_image(camera, POINT, 1e-2)
-    monkeypatch.setattr(lines, "DARK", 0.0)
+    monkeypatch.setattr(individual, "DARK", 0.0)
     whole = points_image(camera, POINT, 1e-2)
     (around, lit), (_, all_lit) = followed
     assert lit < around / 2
@@ -44,7 +44,7 @@ def test_lenslets_that_a_point_leaves_dark_are_not_followed(followed, monkeypatc
 
 
 def test_a_dark_array_has_a_dark_image():
-    relay = LineRelay(Optics.of(WIDE, WIDE.object_distance, 1e-2))
+    relay = AnyShape(Optics.of(WIDE, WIDE.object_distance, 1e-2))
     y, x = relay.places(range(2), range(2))
     assert not relay.field(np.zeros((len(y), len(x))), range(2), range(2)).any()
 
@@ -53,7 +53,7 @@ def test_a_dark_array_has_a_dark_image():
 def test_light_that_is_followed_farther_changes_images_by_less_than_was_asked(accuracy, monkeypatch):
     camera = WIDE.replace(lenslets={"pitch": 0.2 * mm, "count": (9, 9)})
     image = points_image(camera, POINT, accuracy)
-    monkeypatch.setattr(line_parts, "ASIDE", (3.0, 0.0))
+    monkeypatch.setattr(line_matrices, "ASIDE", (3.0, 0.0))
     farther = points_image(camera, POINT, accuracy)
     assert np.linalg.norm(image - farther) < accuracy * np.linalg.norm(farther)
 

@@ -7,7 +7,7 @@ import pytest
 
 from cameras import focused
 from lumigraph.elements import ZernikePlate
-from lumigraph.operators.lenslets import point_images
+from lumigraph.operators.lenslets import cell_images
 from lumigraph.operators.periodic import incoherent, mirrors
 from lumigraph.operators.periodic.incoherent import PeriodicOperator, mirrored_operator, periodic_operator
 from lumigraph.operators.periodic.mirrors import SAME, Mirror
@@ -116,7 +116,7 @@ def test_light_that_is_even_along_one_axis_is_computed_for_one_side(monkeypatch)
         return raw_of(periodic_operator(optics, camera.object_grid, accuracy=1e-2))
 
     found = raw()
-    monkeypatch.setattr(point_images.LensletPlaneWave, "even", (False, False))
+    monkeypatch.setattr(cell_images.LensletPlaneWave, "even", (False, False))
     monkeypatch.setattr(incoherent, "matrix", lambda of, *_: periodic_matrix(of))
     assert off(found, raw()) < 2e-4
 

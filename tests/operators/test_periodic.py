@@ -14,7 +14,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
 from lumigraph.operators import periodic_operator
-from lumigraph.operators.lenslets.point_images import SquareLensletImages
+from lumigraph.operators.lenslets.cell_images import SquareLensletImages
 from lumigraph.operators.lenslets.wave_image import WaveImage
 from lumigraph.operators.periodic import kernels, white
 from lumigraph.operators.periodic.sizes import stream_operations

@@ -6,9 +6,9 @@ from typing import Self
 from lumigraph.core.grid import Grid
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.sees_volumes import VolumeGradients
-from lumigraph.operators.lenslets.part_images import PartImages
 from lumigraph.operators.lenslets.part_leaning import TiltedImages, by_parts
 from lumigraph.operators.lenslets.plane_of_points import plane_before
+from lumigraph.operators.lenslets.point_images import PointImages
 from lumigraph.operators.lenslets.whole_planes import WholePlane
 
 
@@ -17,7 +17,7 @@ class CameraGradients(VolumeGradients, Camera):
 
     def part_images(
         self, pairs: Sequence[tuple[Self, Self]], *, accuracy: float = 1e-2
-    ) -> PartImages | TiltedImages[PartImages]:
+    ) -> PointImages | TiltedImages[PointImages]:
         """Images of points, with derivatives by any difference between pairs of nearby cameras.
 
         Parameters
@@ -106,7 +106,7 @@ class CameraGradients(VolumeGradients, Camera):
         images = self.part_images(pairs, accuracy=accuracy)
         wanted = grid or self.operator_grid()
 
-        def plane(one: PartImages) -> WholePlane:
+        def plane(one: PointImages) -> WholePlane:
             return plane_before(one, wanted, float(dz))
 
         return images.each(plane) if isinstance(images, TiltedImages) else plane(images)

@@ -99,6 +99,8 @@ class ObliqueLight:
         Across the stop.
     place
         The image, ξ [m].
+    beyond
+        Directions beyond the stop on each side, for what its edge is smoothed by.
     """
 
     camera: CameraOptics
@@ -106,6 +108,7 @@ class ObliqueLight:
     distance: float
     samples: int
     place: tuple[float, float]
+    beyond: int = 4
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """As `PointLight.at`."""
@@ -129,7 +132,8 @@ class ObliqueLight:
         way = np.sqrt(self.camera.separation**2 + offsets[0] ** 2 + offsets[1] ** 2)
         rim = [to / way - at / self.chief for to, at in zip(offsets, self.place, strict=True)]
         step = max(float(np.ptp(part)) for part in rim) / self.samples
-        numbers = (np.arange(self.samples + 8) - (self.samples + 7) / 2) * step
+        count = self.samples + 2 * self.beyond
+        numbers = (np.arange(count) - (count - 1) / 2) * step
         down, across = (numbers + (part.max() + part.min()) / 2 for part in rim)
         return down, across
 

@@ -1,4 +1,4 @@
-r"""Light that is a sum over directions, with derivatives: where a lens sends it, and the way back.
+r"""Light that is a sum over directions: where a lens sends it.
 
 With phases P of places along both axes [rad, by the cosine] and cosines d of directions,
 
@@ -13,9 +13,6 @@ import numpy as np
 
 Both = tuple[np.ndarray, np.ndarray]
 """Along y and along x."""
-
-Moves = tuple[Both, Both, np.ndarray, np.ndarray]
-"""Of places, directions, stop (y, x) and bends (3, y, x): changes, or slopes by them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,45 +53,6 @@ class DirectionSum:
     def light(self) -> np.ndarray:
         """Amplitude (y, x) at the places."""
         return np.einsum("kyx, kyx -> yx", self._factors, self.parts)
-
-    def changed(self, by: Moves) -> np.ndarray:
-        """How the light changes."""
-        (down, across), directions, stop, bends = by
-        y, x = self.places
-        left, right = (
-            1j * turn * (np.outer(p, own) + np.outer(at, d))
-            for turn, p, own, at, d in zip(
-                (self.turns[0], self.turns[1].T), (down, across), self.directions, self.places, directions,
-                strict=True,
-            )
-        )  # fmt: skip
-        above = [one @ right.T for one in _each(self.stop, self.bends)]
-        above[0] += stop @ self.turns[1]
-        for k, (bend, more) in enumerate(zip(self.bends, bends, strict=True), 1):
-            above[k] += (bend * stop + more * self.stop) @ self.turns[1]
-        parts = left @ self.above + self.turns[0] @ np.stack(above)
-        found = np.einsum("kyx, kyx -> yx", self._factors, parts)
-        found += 1j * (y * down)[:, None] * self.parts[1] + 1j * (x * across) * self.parts[3]
-        return found + 1j * (np.outer(down, x) + np.outer(y, across)) * self.parts[2]
-
-    def back(self, by: np.ndarray) -> Moves:
-        """Slopes, of those by the light (y, x); what changes is the real part of their products, summed."""
-        (y, x), (left, right), each = self.places, self.turns, by * self._factors
-        bent = [np.real(1j * by * part) for part in self.parts[1:]]
-        down = y * bent[0].sum(1) + bent[1] @ x
-        across = y @ bent[1] + x * bent[2].sum(0)
-        above = left.T @ each
-        ways = (each @ self.above.transpose(0, 2, 1)).sum(0) * left
-        beside, stop = np.zeros_like(right), np.zeros_like(self.stop)
-        bends = np.empty((4, *stop.shape))
-        for k, (one, bend) in enumerate(zip(above, (np.ones(()), *self.bends), strict=True)):
-            mine = one @ right.T
-            beside += (self.stop * bend).T @ one
-            stop += mine * bend
-            bends[k] = np.real(mine * self.stop)
-        ways, beside = np.real(1j * ways), np.real(1j * beside * right)
-        places = down + ways @ self.directions[0], across + self.directions[1] @ beside
-        return places, (y @ ways, beside @ x), stop, bends[1:]
 
     @property
     def _factors(self) -> np.ndarray:

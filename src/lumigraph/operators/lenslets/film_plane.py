@@ -20,10 +20,9 @@ from lumigraph.core import arrays, memory
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
 from lumigraph.errors import SamplingError
-from lumigraph.operators.lenslets.part_images import Gradient as ByWaves
-from lumigraph.operators.lenslets.part_images import PartImages
-from lumigraph.operators.lenslets.part_lens import SampledLens
-from lumigraph.operators.lenslets.part_waves import Both, PointWaves
+from lumigraph.operators.lenslets.gradient import Both, Gradient, Tangent
+from lumigraph.operators.lenslets.no_lenslets import FilmCamera
+from lumigraph.operators.lenslets.point_images import PointImages, squared
 from lumigraph.operators.lenslets.sampled_camera import SourcePoint
 from lumigraph.operators.lenslets.whole_planes import CellPlane
 from lumigraph.operators.sampling.band import Span
@@ -42,12 +41,12 @@ class BlurredPoint:
     ----------
     kernel
         (y, x), on samples around it.
-    waves
-        The point's.
+    source
+        The point.
     """
 
     kernel: np.ndarray
-    waves: PointWaves
+    source: SourcePoint
 
     def add(self, light: np.ndarray, points: np.ndarray) -> None:
         """What points (y, x) bring, to samples of the image from which half a kernel more of them go."""
@@ -72,7 +71,7 @@ class BlurredPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class FilmPlane(CellPlane[SampledLens, BlurredPoint]):
+class FilmPlane(CellPlane[FilmCamera, BlurredPoint]):
     """How a camera without lenslets sees a plane, with derivatives by what differs between pairs of cameras.
 
     The object's samples stay where they are, and as bright for their area, before all cameras.
@@ -92,7 +91,7 @@ class FilmPlane(CellPlane[SampledLens, BlurredPoint]):
         By its methods: images that do not fit in memory.
     """
 
-    images: PartImages
+    images: PointImages
     grid: Grid
     dz: float = 0.0
 
@@ -101,16 +100,16 @@ class FilmPlane(CellPlane[SampledLens, BlurredPoint]):
         """Of a raw image and of an object."""
         return self.images.shape, self.grid.shape
 
-    def _whole(self) -> SampledLens:
+    def _whole(self) -> FilmCamera:
         return self._own
 
-    def _pairs(self) -> Sequence[tuple[SampledLens, SampledLens]]:
+    def _pairs(self) -> Sequence[tuple[FilmCamera, FilmCamera]]:
         return self._ends
 
-    def _read(self, end: SampledLens) -> Linear:
+    def _read(self, end: FilmCamera) -> Linear:
         return end.read
 
-    def _points(self, end: SampledLens, x: np.ndarray) -> np.ndarray:
+    def _points(self, end: FilmCamera, x: np.ndarray) -> np.ndarray:
         spans = tuple(
             Span(span.first - half, span.count + 2 * half, span.pitch)
             for span, half in zip(self._own.film.spans, self._halves, strict=True)
@@ -128,24 +127,20 @@ class FilmPlane(CellPlane[SampledLens, BlurredPoint]):
         return plane
 
     def _blocks(self) -> Iterator[BlurredPoint]:
-        waves = self._bright.waves(*self._point)
-        yield BlurredPoint(np.abs(waves.field) ** 2, waves)
+        sight, source = self._point
+        yield BlurredPoint(squared(sight.own_field(source)[0]), source)
 
     def _changed(self, change: list[float]) -> Callable[[BlurredPoint], BlurredPoint]:
-        sight, spot = self._point
+        sight, source = self._point
         weighed = [(weight, both, None) for weight, both in zip(change, self._around, strict=True)]
-        changed = self._bright.changing(sight, [spot], weighed)
-
-        def of(one: BlurredPoint) -> BlurredPoint:
-            return replace(one, kernel=2 * np.real(one.waves.field.conj() * changed(one.waves)))
-
-        return of
+        changed = Tangent.of(sight, weighed, [source])
+        return lambda one: replace(one, kernel=changed.intensity(one.source)[1])
 
     def _slopes(self) -> "_BlurGradient":
         return _BlurGradient(self._bright.by_pairs(self._point[0], self._around, [None] * len(self._around)))
 
     @cached_property
-    def _bright(self) -> PartImages:
+    def _bright(self) -> PointImages:
         """The same cameras, of which a point stands for a sample of the image: as bright before all."""
 
         def seeing(camera: CameraOptics) -> CameraOptics:
@@ -156,9 +151,9 @@ class FilmPlane(CellPlane[SampledLens, BlurredPoint]):
         return replace(self.images, camera=seeing(self.images.camera), pairs=pairs)
 
     @cached_property
-    def _own(self) -> SampledLens:
+    def _own(self) -> FilmCamera:
         """Of the whole image."""
-        own = cast(SampledLens, self.images.before(self._middle)[0])
+        own = cast(FilmCamera, self.images.before(self._middle)[0])
         window = [smooth_size(n + 2 * half) for n, half in zip(own.shape, self._halves_of(own), strict=True)]
         memory.require(
             8.0 * 8 * math.prod(window), f"the image's {window[0]} x {window[1]} samples",
@@ -167,19 +162,19 @@ class FilmPlane(CellPlane[SampledLens, BlurredPoint]):
         return own
 
     @cached_property
-    def _ends(self) -> list[tuple[SampledLens, SampledLens]]:
-        return cast(list[tuple[SampledLens, SampledLens]], self.images.ends(self._own))
+    def _ends(self) -> list[tuple[FilmCamera, FilmCamera]]:
+        return cast(list[tuple[FilmCamera, FilmCamera]], self.images.ends(self._own))
 
     @cached_property
-    def _point(self) -> tuple[SampledLens, SourcePoint]:
+    def _point(self) -> tuple[FilmCamera, SourcePoint]:
         """A point on the axis, and the camera sampled around its image."""
-        own = cast(SampledLens, self._bright.before(self._middle)[0])
+        own = cast(FilmCamera, self._bright.before(self._middle)[0])
         y, x = (
             Span(-half, 2 * half + 1, span.pitch)
             for half, span in zip(self._halves, own.film.spans, strict=True)
         )
         sight = replace(own, optics=cast(Any, replace(own.film, spans=(y, x))))
-        return sight, sight.spots(self._middle)[0]
+        return sight, sight.sources(self._middle)[0]
 
     @cached_property
     def _around(self) -> list[Both]:
@@ -194,7 +189,7 @@ class FilmPlane(CellPlane[SampledLens, BlurredPoint]):
         return self._halves_of(self._own)
 
     @staticmethod
-    def _halves_of(own: SampledLens) -> tuple[int, int]:
+    def _halves_of(own: FilmCamera) -> tuple[int, int]:
         """Samples to which a point's light is followed, along y and along x."""
         y, x = (math.floor(own.film.far / span.pitch) for span in own.film.spans)
         return y, x
@@ -202,12 +197,12 @@ class FilmPlane(CellPlane[SampledLens, BlurredPoint]):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _BlurGradient:
-    """`whole_planes.Told` by a point's waves."""
+    """Slopes of a number by a point's image; see `whole_planes`."""
 
-    by: ByWaves
+    by: Gradient
 
     def add(self, block: BlurredPoint, asked: np.ndarray) -> None:
-        self.by.add(block.waves, asked * block.waves.field.conj())
+        self.by.add(block.source, asked)
 
     def along(self) -> np.ndarray:
         return self.by.along()

@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from lumigraph.core.threads import each
+from lumigraph.operators.lenslets.cell_images import LensletPlaneWave, through
 from lumigraph.operators.lenslets.cell_response import (
     STEP,
     CellAxis,
@@ -27,7 +28,6 @@ from lumigraph.operators.lenslets.cell_response import (
     nodes,
     times_real,
 )
-from lumigraph.operators.lenslets.point_images import LensletPlaneWave, through
 
 Pair = tuple[float, float]
 

@@ -11,11 +11,10 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from lumigraph.operators.lenslets.gradient import Moved
 from lumigraph.operators.lenslets.paraxial_error import resolved
-from lumigraph.operators.lenslets.part_exact import ExactImages
-from lumigraph.operators.lenslets.part_images import PartImages, one_lens, require_paraxial
 from lumigraph.operators.lenslets.part_points import Back, PartPoints, SteppedPoints
-from lumigraph.operators.lenslets.part_waves import Where
+from lumigraph.operators.lenslets.point_images import PointImages, one_lens, require_paraxial
 from lumigraph.operators.lenslets.tilted_planes import near
 from lumigraph.operators.lenslets.whole_planes import PlaneImages
 from lumigraph.operators.sampling.camera import CameraOptics, HasOptics
@@ -122,27 +121,25 @@ def weighed(moved: np.ndarray, seen: Sequence[np.ndarray]) -> np.ndarray:
 
 def by_parts(
     camera: HasOptics, pairs: Sequence[tuple[HasOptics, HasOptics]], accuracy: float
-) -> PartImages | TiltedImages[PartImages]:
+) -> PointImages | TiltedImages[PointImages]:
     """Of instruments, a little to either side of one, whose model they have where theirs is "auto".
 
     Raises
     ------
     GeometryError
-        As of `PartImages`.
+        As of `PointImages`.
     SamplingError
         As of `leaning.flat`.
     """
     own, ends = resolved(camera.optics(), accuracy), [end.optics() for both in pairs for end in both]
     ends = [replace(end, model=own.model) if end.model == "auto" else end for end in ends]
     both = tuple(zip(ends[::2], ends[1::2], strict=True))
-    if own.model == "exact":
-        return ExactImages(own, both, accuracy)
-    plain = all(one.lean is None for one in (own, *ends))
-    return PartImages(own, both, accuracy) if plain else _leaning(own, both, accuracy)
+    plain = own.model == "exact" or all(one.lean is None for one in (own, *ends))
+    return PointImages(own, both, accuracy) if plain else _leaning(own, both, accuracy)
 
 
 def points_before(
-    images: PartImages | TiltedImages[PartImages], points: Points, moved: Sequence[Where]
+    images: PointImages | TiltedImages[PointImages], points: Points, moved: Sequence[Moved]
 ) -> PartPoints | TiltedPoints:
     """Points one by one, before any camera; elsewhere before those of each pair."""
     if isinstance(images, TiltedImages):
@@ -151,21 +148,21 @@ def points_before(
     return _flat(images, points, moved)
 
 
-def _flat(images: PartImages, points: Points, moved: Sequence[Where]) -> PartPoints:
+def _flat(images: PointImages, points: Points, moved: Sequence[Moved]) -> PartPoints:
     turned = images.camera.model == "paraxial" and one_lens(images.camera)
     return (PartPoints if turned else SteppedPoints)(images, points, moved)
 
 
 def _leaning(
     camera: CameraOptics, pairs: Sequence[tuple[CameraOptics, CameraOptics]], accuracy: float
-) -> TiltedImages[PartImages]:
+) -> TiltedImages[PointImages]:
     """Of cameras of which one leans at least."""
     for one in (camera, *(end for pair in pairs for end in pair)):
         require_paraxial(one)
     found = near(camera, [end for pair in pairs for end in pair], accuracy)
     own, ends = found.of(camera), [(found.of(low), found.of(high)) for low, high in pairs]
     parts = tuple(
-        PartImages(one, tuple((low.cameras[n], high.cameras[n]) for low, high in ends), accuracy)
+        PointImages(one, tuple((low.cameras[n], high.cameras[n]) for low, high in ends), accuracy)
         for n, one in enumerate(own.cameras)
     )
     moved = np.array([high.weights - low.weights for low, high in ends])

@@ -8,26 +8,20 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from lumigraph.core import arrays
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
-from lumigraph.operators.lenslets.part_images import Gradient as ByWaves
-from lumigraph.operators.lenslets.part_images import PartImages
-from lumigraph.operators.lenslets.part_waves import Both, Where
-from lumigraph.operators.lenslets.points import SPARE
-from lumigraph.operators.lenslets.sampled_camera import SampledCamera, SourcePoint
+from lumigraph.operators.lenslets.gradient import Both, Gradient, Moved, Tangent
+from lumigraph.operators.lenslets.point_images import PointImages, squared
+from lumigraph.operators.lenslets.sampled_camera import SPARE, SampledCamera, SourcePoint
 from lumigraph.operators.lenslets.whole_planes import CellPlane, RepeatedImages
 from lumigraph.operators.sampling.camera import CameraOptics
 from lumigraph.operators.sampling.optics import Optics
 from lumigraph.operators.sampling.tiles import as_plane, by_cell, spread
 from lumigraph.scene import Points
-
-NODES = 64
-"""Across the main lens, at least: more where the accuracy asks for them."""
 
 TOGETHER = 8
 """Points whose images are known at a time."""
@@ -51,7 +45,7 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
         Depth from the focused plane [m].
     """
 
-    images: PartImages
+    images: PointImages
     grid: Grid
     dz: float = 0.0
 
@@ -71,11 +65,11 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
 
     def _changed(self, change: list[float]) -> Callable[["CellImages"], RepeatedImages]:
         weighed = list(zip(change, self._ends, self._moved, strict=True))
-        changed = self._amid.changing(self._own, self._spots, weighed)
+        changed = Tangent.of(self._own, weighed, self._spots)
         return lambda block: block.changed(changed)
 
-    def _slopes(self) -> "_CellGradient":
-        return _CellGradient(self._amid.by_pairs(self._own, self._ends, self._moved))
+    def _slopes(self) -> "_BlockGradient":
+        return _BlockGradient(self._amid.by_pairs(self._own, self._ends, self._moved))
 
     def _points(self, end: SampledCamera, x: np.ndarray) -> np.ndarray:
         optics, cells = self._optics(end), end.optics.cells
@@ -101,11 +95,10 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
     def _blocks(self) -> Iterator["CellImages"]:
         spots = self._spots
         for k in range(0, len(spots), TOGETHER):
-            waves = [self._amid.waves(self._own, spot) for spot in spots[k : k + TOGETHER]]
-            yield CellImages.of(self._own, waves, self._margin)
+            yield CellImages.of(self._own, spots[k : k + TOGETHER], self._margin)
 
     @cached_property
-    def _amid(self) -> PartImages:
+    def _amid(self) -> PointImages:
         """Of arrays around the points of one cell, as wide as their light is followed."""
         camera, finer = self.images.camera, SPARE * self.images.accuracy
         optics = Optics.of(camera, camera.object_distance + self.dz, finer)
@@ -121,7 +114,9 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
     def _own(self) -> SampledCamera:
         """Before points of a cell amid."""
         middle = Points(np.array([[0.0, 0.0, self.dz]]), np.ones(1))
-        return self._amid.before(middle, fewest=NODES)[0]
+        camera, finer = self.images.camera, SPARE * self.images.accuracy
+        beside = math.hypot(*Optics.of(camera, camera.object_distance + self.dz, finer).cells.size)
+        return self._amid.before(middle, beside=beside)[0]
 
     @cached_property
     def _ends(self) -> list[Both]:
@@ -141,10 +136,10 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
 
     @cached_property
     def _spots(self) -> list[SourcePoint]:
-        return self._own.spots(self._lit(self._own))
+        return self._own.sources(self._lit(self._own))
 
     @cached_property
-    def _moved(self) -> list[Where | None]:
+    def _moved(self) -> list[Moved | None]:
         return [(self._lit(first), self._lit(last)) for first, last in self._ends]
 
     def _lit(self, own: SampledCamera) -> Points:
@@ -166,7 +161,10 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
         """Cells to which light comes from one."""
         far = []
         for k, middle in enumerate(middle_of(self._own)):
-            ends = [(middle - spot.cells[k].start, spot.cells[k].stop - 1 - middle) for spot in self._spots]
+            ends = [
+                (middle - spot.lit.cells[k].start, spot.lit.cells[k].stop - 1 - middle)
+                for spot in self._spots
+            ]
             far.append(max(map(max, ends)))
         return far[0], far[1]
 
@@ -177,68 +175,65 @@ class CellImages(RepeatedImages):
 
     Parameters
     ----------
-    waves
-        The points'.
-    samples
-        (y, x) of a cell.
+    own
+        The camera.
+    sources
+        The points.
     """
 
-    waves: list[Any]
-    samples: tuple[int, int]
+    own: SampledCamera
+    sources: list[SourcePoint]
 
     @classmethod
-    def of(cls, own: SampledCamera, waves: list[Any], margin: tuple[int, int]) -> "CellImages":
-        """Of points with others around the array, so many cells on all sides."""
-        spots = [one.spot for one in waves]
-        numbers = slice(spots[0].number, spots[-1].number + 1)
-        places = zip(margin, middle_of(own), _lit(spots), strict=True)
+    def of(cls, own: SampledCamera, sources: list[SourcePoint], margin: tuple[int, int]) -> "CellImages":
+        """Images of points with others around the array, so many cells on all sides."""
+        numbers = slice(sources[0].number, sources[-1].number + 1)
+        places = zip(margin, middle_of(own), _lit(sources), strict=True)
         y, x = (more + middle - lit.start for more, middle, lit in places)
-        found = cls(np.zeros(()), numbers, (y, x), waves, own.optics.cells.samples)
-        return found._with([one.spot.intensity * np.abs(one.field) ** 2 for one in waves])
+        found = cls(np.zeros(()), numbers, (y, x), own, sources)
+        return found._with([one.intensity * squared(own.own_field(one)[0]) for one in sources])
 
-    def changed(self, by: Callable[[Any], np.ndarray]) -> "CellImages":
-        """Change of the images, by that of each field."""
-        return self._with([
-            2 * one.spot.intensity * np.real(one.field.conj() * by(one)) for one in self.waves
-        ])  # fmt: skip
+    def changed(self, by: Tangent) -> "CellImages":
+        """Change of the images."""
+        return self._with([one.intensity * by.intensity(one)[1] for one in self.sources])
 
     def of_each(self, kernel: np.ndarray) -> Iterator[np.ndarray]:
-        """What a kernel has of each point's image (y, x)."""
-        for k, waves in enumerate(self.waves):
-            tiles = kernel[(*self._inside(waves.spot), k)]
-            yield arrays.untiled(tiles.reshape(*tiles.shape[:2], *self.samples))
+        """Part of a kernel that is each point's image (y, x)."""
+        for k, source in enumerate(self.sources):
+            tiles = kernel[(*self._inside(source), k)]
+            yield arrays.untiled(tiles.reshape(*tiles.shape[:2], *self.own.optics.cells.samples))
 
     def _with(self, images: Sequence[np.ndarray]) -> "CellImages":
-        """With other images (y, x) of the points."""
-        size = [len(cells) for cells in self._cells]
-        kernel = np.zeros((*size, len(images), math.prod(self.samples)))
-        for k, (waves, image) in enumerate(zip(self.waves, images, strict=True)):
-            tiles = arrays.tiled(image, self.samples)
-            kernel[(*self._inside(waves.spot), k)] = tiles.reshape(*tiles.shape[:2], -1)
+        """The same with other images (y, x) of the points."""
+        size, samples = [len(cells) for cells in self._cells], self.own.optics.cells.samples
+        kernel = np.zeros((*size, len(images), math.prod(samples)))
+        for k, (source, image) in enumerate(zip(self.sources, images, strict=True)):
+            tiles = arrays.tiled(image, samples)
+            kernel[(*self._inside(source), k)] = tiles.reshape(*tiles.shape[:2], -1)
         return replace(self, kernel=kernel)
 
     @property
     def _cells(self) -> tuple[range, range]:
-        return _lit([waves.spot for waves in self.waves])
+        return _lit(self.sources)
 
-    def _inside(self, spot: SourcePoint) -> tuple[slice, slice]:
+    def _inside(self, source: SourcePoint) -> tuple[slice, slice]:
         """The point's cells in the kernel."""
         y, x = (
             slice(mine.start - lit.start, mine.stop - lit.start)
-            for mine, lit in zip(spot.cells, self._cells, strict=True)
+            for mine, lit in zip(source.lit.cells, self._cells, strict=True)
         )
         return y, x
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _CellGradient:
-    """`whole_planes.Told` before a camera: slopes by points' waves."""
+class _BlockGradient:
+    """Slopes of a number by images of a cell's points; see `whole_planes`."""
 
-    by: ByWaves
+    by: Gradient
 
     def add(self, block: CellImages, asked: np.ndarray) -> None:
-        for waves, part in zip(block.waves, block.of_each(asked), strict=True):
-            self.by.add(waves, waves.spot.intensity * part * waves.field.conj())
+        for source, part in zip(block.sources, block.of_each(asked), strict=True):
+            self.by.add(source, source.intensity * part)
 
     def along(self) -> np.ndarray:
         return self.by.along()
@@ -246,7 +241,7 @@ class _CellGradient:
 
 def _lit(spots: Sequence[SourcePoint]) -> tuple[range, range]:
     """Rows and columns that any of the points lights."""
-    some = [spot.cells for spot in spots]
+    some = [spot.lit.cells for spot in spots]
     y, x = (range(min(one[k].start for one in some), max(one[k].stop for one in some)) for k in (0, 1))
     return y, x
 

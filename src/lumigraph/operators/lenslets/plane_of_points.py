@@ -16,8 +16,8 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError
 from lumigraph.operators.lenslets.film_plane import FilmPlane
 from lumigraph.operators.lenslets.paraxial_error import field_matters
-from lumigraph.operators.lenslets.part_images import PartImages, one_lens
 from lumigraph.operators.lenslets.part_plane import PartPlane
+from lumigraph.operators.lenslets.point_images import PointImages, one_lens
 from lumigraph.operators.lenslets.whole_planes import WholePlane
 from lumigraph.operators.periodic.kernels import A_MINUTE, LONGEST, said
 from lumigraph.operators.sampling.camera import CameraOptics
@@ -56,7 +56,7 @@ class PlaneOfPoints(WholePlane):
         By its methods: points that take more than a minute.
     """
 
-    images: PartImages
+    images: PointImages
     grid: Grid
     dz: float = 0.0
 
@@ -87,8 +87,8 @@ class PlaneOfPoints(WholePlane):
     def _check(self, objects: int, points: int) -> None:
         """Refuse what takes too much memory or time; warn of minutes."""
         own, mine, _ = self._as_bright.before(self._points)
-        (spot,) = own.spots(Points(mine.positions[len(mine.positions) // 2, None], np.ones(1)))
-        y, x = (len(places) for places in own.lenslets.places(*spot.cells))
+        (spot,) = own.sources(Points(mine.positions[len(mine.positions) // 2, None], np.ones(1)))
+        y, x = (len(places) for places in own.lenslets.places(*spot.lit.cells))
         sums = EXACT if self.images.camera.model == "exact" else 1
         memory.require(
             8.0 * (3 * objects * math.prod(own.shape) + 4 * sums * (own.nodes + y) * (own.nodes + x)),
@@ -105,7 +105,7 @@ class PlaneOfPoints(WholePlane):
         said(operations, f"an image of {points} samples, as many points, takes")
 
     @cached_property
-    def _as_bright(self) -> PartImages:
+    def _as_bright(self) -> PointImages:
         """The same cameras, of which a point stands for a sample: as bright before all."""
         area = math.prod(self.grid.pitch)
 
@@ -131,7 +131,7 @@ class PlaneOfPoints(WholePlane):
         return Points(np.stack([y, x, np.full(y.shape, self.dz)], axis=1), np.ones(y.size))
 
 
-def plane_before(images: PartImages, grid: Grid, dz: float) -> WholePlane:
+def plane_before(images: PointImages, grid: Grid, dz: float) -> WholePlane:
     """Before cameras that see points as `images` have them: whole where images repeat, or by points."""
     camera = images.camera
     if one_lens(camera) and camera.array is None and camera.model == "paraxial":

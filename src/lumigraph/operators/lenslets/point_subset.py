@@ -13,9 +13,9 @@ import numpy as np
 import scipy.linalg
 
 from lumigraph.core.threads import each
+from lumigraph.operators.lenslets.cell_images import Line, intensity, mirrored
 from lumigraph.operators.lenslets.cell_response import CellAxis
 from lumigraph.operators.lenslets.lenslet_light import LensletLight, Row
-from lumigraph.operators.lenslets.point_images import Line, intensity, mirrored
 
 AT_A_TIME = 2**20
 """Numbers worked on at a time."""

@@ -21,7 +21,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
 from lumigraph.core.threads import single_products
 from lumigraph.errors import GeometryError
-from lumigraph.operators.lenslets.part_waves import times
+from lumigraph.operators.lenslets.gradient import times
 
 
 class PlaneImages(Protocol):

@@ -18,7 +18,7 @@ import numpy as np
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
 from lumigraph.errors import GeometryError
-from lumigraph.operators.lenslets.part_waves import times
+from lumigraph.operators.lenslets.gradient import times
 from lumigraph.operators.lenslets.whole_planes import WholePlane
 from lumigraph.operators.microscope.fourier_changes import FourierGradient, LensletImage, SampledPupil, pupils
 from lumigraph.operators.microscope.fourier_microscope import FourierMicroscopeOperator, lit_ones

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lumigraph.operators.lenslets.part_waves import times
+from lumigraph.operators.lenslets.gradient import times
 from lumigraph.operators.lenslets.whole_planes import RepeatedImages
 from lumigraph.operators.microscope.pupil import PupilImages
 from lumigraph.operators.microscope.pupil_points import Both, WindowParts

@@ -19,7 +19,7 @@ import numpy as np
 from lumigraph.core.threads import single_products
 from lumigraph.elements.objective import Objective
 from lumigraph.errors import GeometryError
-from lumigraph.operators.lenslets.part_waves import times
+from lumigraph.operators.lenslets.gradient import times
 from lumigraph.operators.microscope.cell import Lenslet
 from lumigraph.operators.microscope.pupil import PupilImages
 from lumigraph.operators.microscope.pupil_waves import (

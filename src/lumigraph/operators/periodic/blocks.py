@@ -21,16 +21,16 @@ from lumigraph.core import memory
 from lumigraph.core.arrays import WORKERS
 from lumigraph.core.progress import Progress, within
 from lumigraph.core.threads import each
-from lumigraph.operators.lenslets.cell_response import INFINITE, Limits
-from lumigraph.operators.lenslets.exact_lenslets import lenslets_of
-from lumigraph.operators.lenslets.lenslet_light import LensletLight, windows
-from lumigraph.operators.lenslets.point_images import (
+from lumigraph.operators.lenslets.cell_images import (
     IlluminatedCells,
     SquareLensletImages,
     lit,
     mirrored,
     wave,
 )
+from lumigraph.operators.lenslets.cell_response import INFINITE, Limits
+from lumigraph.operators.lenslets.exact_lenslets import lenslets_of
+from lumigraph.operators.lenslets.lenslet_light import LensletLight, windows
 from lumigraph.operators.lenslets.point_subset import ChosenPoints, PointSubset, chosen, few
 from lumigraph.operators.periodic.border_correction import BorderCorrection
 from lumigraph.operators.periodic.factors import Factors, FoundFactors, factors, narrowed, together, weakest

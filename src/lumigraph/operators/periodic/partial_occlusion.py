@@ -14,9 +14,9 @@ import numpy as np
 from lumigraph.core.grid import Grid
 from lumigraph.core.progress import Progress
 from lumigraph.core.threads import each
-from lumigraph.operators.lenslets.cell_response import MIDDLE
-from lumigraph.operators.lenslets.points import on_lenslets
-from lumigraph.operators.lenslets.relay import SeparableRelay, relay
+from lumigraph.operators.lenslets.illuminated import on_lenslets
+from lumigraph.operators.lenslets.relay import relay
+from lumigraph.operators.lenslets.square import SquareLenslets
 from lumigraph.operators.periodic.incoherent import PeriodicOperator
 from lumigraph.operators.periodic.screens import OPEN, PARTLY, Screen, Shadow
 from lumigraph.operators.sampling import cells as _cells
@@ -232,9 +232,9 @@ class PartlyHidden:
             np.exp(self._turn * np.outer(at - m, self.pupil)).astype(np.complex64)
             for at, m in zip((y, x), middle, strict=True)
         )
-        if isinstance(self.relay, SeparableRelay):
-            down = self.relay.along(0, down[None], rows, MIDDLE)[0]
-            across = self.relay.along(1, across[None], columns, MIDDLE)[0]
+        if type(self.relay) is SquareLenslets:
+            down = self.relay.along(0, down, rows)
+            across = self.relay.along(1, across, columns)
             yield from down @ (waves @ across.T)
             return
         for wave in waves:

@@ -51,21 +51,21 @@ ON_LINES: Key = ("on lines",)
 
 
 @dataclass(eq=False)
-class LineParts:
+class LineMatrices:
     """Of a camera; sampled as those of another that hardly differs, if there is one."""
 
     optics: Optics
     precision: type[np.complexfloating] = np.complex64
-    like: "LineParts | None" = None
+    like: "LineMatrices | None" = None
     _pieces: dict[Key, np.ndarray] = field(default_factory=dict)
     _values: dict[tuple[int, float], np.ndarray] = field(default_factory=dict)
 
-    def piece(self, key: Key) -> np.ndarray:
+    def number(self, key: Key) -> np.ndarray:
         """A matrix: `ON_LINES`, "along" or "down" of a kind, "carried" along an axis from an offset."""
         if key not in self._pieces:
             what, *of = key
             if self.like is not None and self._shared(what, *of):
-                self._pieces[key] = self.like.piece(key)
+                self._pieces[key] = self.like.number(key)
             elif what == "along":
                 self._pieces.update((("along", kind), made) for kind, made in self._along())
             else:
@@ -271,6 +271,16 @@ class LineParts:
         chords, like = np.unique(self._lines[2].round(12), return_inverse=True)
         return [np.flatnonzero(like == chord) for chord in range(len(chords))]
 
+    @cached_property
+    def chord_of_line(self) -> np.ndarray:
+        """Number of each line's chord."""
+        if self.like is not None:
+            return self.like.chord_of_line
+        found = np.empty(len(self._lines[0]), int)
+        for chord, lines in enumerate(self.like_lines):
+            found[lines] = chord
+        return found
+
     def _on_lines(self) -> np.ndarray:
         """From light along y (window) to the lines across a lenslet: (lines, window)."""
         return self._held_at(0, self._lines[0])
@@ -328,7 +338,7 @@ class LineParts:
         return times_real(turn.T, sequences.T).T
 
     def _along(self) -> Iterator[tuple[int, np.ndarray]]:
-        """From light (window) on a line to few numbers along x: (chords, k, window) of kinds not shared.
+        """From light (window) on a line to few numbers along x: (lines, k, window) of kinds not shared.
 
         They share what goes from a line's nodes to the samples: polynomials give it for all chords, by what
         it is for the longest.
@@ -344,7 +354,7 @@ class LineParts:
                 bends = [self._bend(focal_length, longest * mine.at) for mine in chords]
                 parts = zip(there, bends, self._on_chords, strict=True)
                 found = [times_real(one * bend, light) for one, bend, light in parts]
-                yield kind, np.array(found, self.precision)
+                yield kind, np.array(found, self.precision)[self.chord_of_line]
 
     @cached_property
     def _nodes(self) -> list["_Nodes"]:

@@ -1,21 +1,23 @@
-"""A camera without lenslets before points, as `part_sight` has those with: light goes straight to the pixels.
+"""A camera without lenslets before points: light goes straight to the pixels.
 
 Samples of the image are those of `single_lens`; those of cameras that hardly differ stay where they are.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Any, Self, cast
 
 import numpy as np
 
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
-from lumigraph.operators.lenslets.line_parts import Key
-from lumigraph.operators.lenslets.point_changes import PUPIL
-from lumigraph.operators.lenslets.sampled_camera import EDGE, Lit, SampledCamera, SourcePoint, reach_of
-from lumigraph.operators.lenslets.transmitted import LensletGradient
+from lumigraph.operators.lenslets import main_lens
+from lumigraph.operators.lenslets.array_libraries import Array, ArrayLibrary, Numbers
+from lumigraph.operators.lenslets.illuminated import IlluminatedCells
+from lumigraph.operators.lenslets.sampled_camera import SampledCamera, SourcePoint, reach_of
+from lumigraph.operators.lenslets.square import Ways
 from lumigraph.operators.sampling import cells as _cells
 from lumigraph.operators.sampling.band import Span
 from lumigraph.operators.sampling.camera import CameraOptics
@@ -29,13 +31,10 @@ WIDER, TAIL = 1.5, 4.0
 An Airy disc's rms beyond r [λL/D] is 0.08/r² of its own.
 """
 
-PERIOD = 3.0
-"""Nodes across the main lens for each λL/D that light is followed to: it comes again beyond."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FilmGrid:
-    """Where the image is sampled.
+class Film:
+    """Samples of the image.
 
     Parameters
     ----------
@@ -57,56 +56,59 @@ class FilmGrid:
     rotation = 0.0
     image_scale = 1.0
 
-    def alike(self, camera: CameraOptics) -> "FilmGrid":
-        """Of a camera that hardly differs."""
+    def alike(self, camera: CameraOptics) -> "Film":
+        """The samples of a camera that hardly differs."""
         return replace(self, camera=camera)
 
 
 @dataclass(frozen=True, slots=True)
 class NoLenslets:
-    """In the place of lenslets: light stays as it is."""
+    """Nothing in the place of lenslets: light stays as it is."""
 
-    film: FilmGrid
+    film: Film
 
     def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
-        """Of samples [m]."""
+        """Places of samples [m]."""
         y, x = (
             span.positions[part.start : part.stop]
             for span, part in zip(self.film.spans, (rows, columns), strict=True)
         )
         return y, x
 
-    def keys(self, rows: range, columns: range) -> set[Key]:
-        """No matrices."""
-        return set()
+    def lit(self, light: np.ndarray, cells: Ways) -> None:
+        """No choice."""
 
-    def passed(self, light: np.ndarray, rows: range, columns: range) -> "UnchangedLight":
-        """Light at those places."""
-        return UnchangedLight(light)
+    def keys(self, cells: Ways) -> list[Any]:
+        """No arrays."""
+        return []
 
+    def grouped(self, keys: Iterable[Any]) -> list[list[Any]]:
+        """No arrays."""
+        return []
 
-@dataclass(frozen=True, slots=True, eq=False)
-class UnchangedLight:
-    """`Passed` where there are no lenslets."""
+    def numbers(self, keys: Iterable[Any]) -> dict[Any, np.ndarray]:
+        """No numbers."""
+        return {}
 
-    field: np.ndarray
+    def prepared(self, keys: Iterable[Any]) -> dict[Any, np.ndarray]:
+        """No arrays."""
+        return {}
 
-    def changed(self, light: np.ndarray, change: Any) -> np.ndarray:
-        """As `Passed.changed`."""
+    def amplitude(self, xp: ArrayLibrary, prepared: Numbers, light: Array, cells: Ways, lit: Any) -> Array:
+        """The light itself."""
         return light
-
-    def back(self, by: np.ndarray, slopes: LensletGradient) -> np.ndarray:
-        """As `Passed.back`."""
-        return by
 
 
 @dataclass(frozen=True, eq=False)
-class SampledLens(SampledCamera):
-    """As `SampledCamera`, of a camera without lenslets."""
+class FilmCamera(SampledCamera):
+    """A camera without lenslets before points, and how finely all is sampled."""
 
     @classmethod
-    def of(cls, camera: CameraOptics, points: Points, accuracy: float, fewest: int = PUPIL) -> "SampledLens":
-        """As finely as the accuracy and the points ask for."""
+    def of(
+        cls, camera: CameraOptics, points: Points, accuracy: float, *, beside: float = 0.0,
+        precision: type[np.complexfloating] = np.complex128,
+    ) -> Self:  # fmt: skip
+        """A camera sampled as finely as the accuracy and the points ask for."""
         distances, pixels = camera.object_distance + points.positions[:, 2], camera.sensor.grid
         blur, airy = max(_cells.blur(camera, z) for z in distances.tolist()), _cells.airy(camera)
         far = WIDER * blur + TAIL / math.sqrt(accuracy) * airy
@@ -115,20 +117,21 @@ class SampledLens(SampledCamera):
             Span.around(-at - side, -at + side, image_pitch(camera))  # a readout is turned by 180°
             for at, side in zip(pixels.center, half, strict=True)
         )
-        nodes = max(fewest, *(2 * math.ceil(n / 2) for n in (PERIOD * far / airy, EDGE / accuracy)))
-        film = FilmGrid(camera, float(distances[0]), (y, x), far)
-        return cls(cast(Any, film), nodes, reach=reach_of(camera))
+        film = Film(camera, float(distances[0]), (y, x), far)
+        made = cls(cast(Any, film), 0, reach_of(camera), precision)
+        nodes = [made._nodes_for(source, beside) for source in made.sources(points)]
+        return replace(made, nodes=max(nodes))
 
     @property
     def shape(self) -> tuple[int, int]:
-        """As of cameras with lenslets."""
+        """Number of samples of the image (y, x)."""
         y, x = (span.count for span in self.film.spans)
         return y, x
 
     @cached_property
     def read(self) -> Linear:
-        """As of cameras with lenslets."""
-        if isinstance(self.like, SampledLens) and self.like._seen == self._seen:
+        """Means over pixels of the image's samples."""
+        if isinstance(self.like, FilmCamera) and self.like._seen == self._seen:
             return self.like.read
         sensor, (y, x) = self.film.camera.sensor, self.film.spans
         center = tuple((span.first + span.count // 2) * span.pitch for span in (y, x))
@@ -137,12 +140,18 @@ class SampledLens(SampledCamera):
 
     @cached_property
     def lenslets(self) -> Any:
-        """None: the same before all cameras."""
+        """Nothing: the same before all cameras."""
         return NoLenslets(self.film) if self.like is None else self.like.lenslets
 
-    def _lit(self, spot: SourcePoint) -> Lit:
+    def _nodes_for(self, source: SourcePoint, beside: float) -> int:
+        optics, lens = self._at(source.dz), self._lens(source)
+        widest = math.sqrt(2) * self.film.far + beside
+        widest += main_lens.widest_ray(optics.camera, lens, optics.distance)
+        return main_lens.samples_across(optics.camera, widest, main_lens.opening_of(lens).slack)
+
+    def _illuminated(self, source: SourcePoint) -> IlluminatedCells:
         parts = []
-        place = self._place(self._at(spot.dz), spot.position).tolist()
+        place = self._place(self._at(source.dz), source.position).tolist()
         for at, span in zip(place, self.film.spans, strict=True):
             ends = (
                 math.floor((at - self.film.far) / span.pitch),
@@ -151,7 +160,7 @@ class SampledLens(SampledCamera):
             first, last = (min(max(0, end - span.first), span.count) for end in ends)
             parts.append(range(first, last))
         y, x = parts
-        return (y, x), (slice(y.start, y.stop), slice(x.start, x.stop))
+        return IlluminatedCells((y, x), (slice(y.start, y.stop), slice(x.start, x.stop)))
 
     @cached_property
     def _seen(self) -> tuple[Any, ...]:
@@ -159,6 +168,6 @@ class SampledLens(SampledCamera):
         return sensor.grid, sensor.fill_factor
 
     @property
-    def film(self) -> FilmGrid:
-        """Its samples: in the place of `optics`."""
-        return cast(FilmGrid, self.optics)
+    def film(self) -> Film:
+        """Samples of the image: in the place of `optics`."""
+        return cast(Film, self.optics)
