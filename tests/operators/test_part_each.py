@@ -165,10 +165,10 @@ def test_lenslets_that_are_alike_begin_to_differ():
     assert off(images.forward(POINT), alike.part_images([]).forward(POINT)) < 1e-3
 
 
-def test_a_gradient_takes_less_than_three_times_the_memory_of_an_image(rng):
+def test_a_gradient_takes_less_than_six_times_the_memory_of_an_image(rng):
     images = camera(START).part_images([pair(START, key) for key in KEYS[1::2]])
     weights = rng.random(images.shape)
-    assert peak(lambda: images.gradient(POINTS, weights)) < 3 * peak(lambda: images.forward(POINTS))
+    assert peak(lambda: images.gradient(POINTS, weights)) < 6 * peak(lambda: images.forward(POINTS))
 
 
 @pytest.mark.parametrize("change", [{"missing": 0.06}, {"seed": 4}])

@@ -13,8 +13,9 @@ from tests.operators.test_part_images import camera, off, pair, peak
 import lumigraph as lg
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError, SamplingWarning
-from lumigraph.operators import part_images, single_lens
+from lumigraph.operators import single_lens
 from lumigraph.operators.lenslets import plane_of_points
+from lumigraph.operators.lenslets import point_images as part_images
 from lumigraph.operators.lenslets.film_plane import FilmPlane
 from lumigraph.operators.lenslets.part_leaning import TiltedImages
 from lumigraph.operators.lenslets.part_plane import PartPlane
@@ -142,11 +143,11 @@ def test_more_samples_take_no_more_memory_and_their_order_is_none(monkeypatch):
 
 def test_planes_that_take_too_long_are_refused_and_minutes_are_told(monkeypatch):
     seen = plane("differ")
-    monkeypatch.setattr(plane_of_points, "LONGEST", 1e8)
+    monkeypatch.setattr(plane_of_points, "LONGEST", 1e5)
     with pytest.raises(SamplingError, match=r"6 samples are as many points.*Use a smaller grid"):
         seen.forward(np.ones(GRID.shape))
     monkeypatch.setattr(plane_of_points, "LONGEST", 1e15)
-    monkeypatch.setattr("lumigraph.operators.lenslets.plane_of_points.A_MINUTE", 1e8)
+    monkeypatch.setattr("lumigraph.operators.sampling.time_limits.A_MINUTE", 1e5)
     with pytest.warns(SamplingWarning, match="an image of 6 samples, as many points, takes some"):
         seen.forward(np.ones(GRID.shape))
 

@@ -63,6 +63,10 @@ class Banded:
         seen = slice(min(rows, default=0), max(rows, default=0))
         return seen, Banded(columns.stop - columns.start, tuple(blocks))
 
+    def inner(self, plane: np.ndarray) -> float:
+        """Sum of the matrix' entries, each times that of a plane (rows, columns)."""
+        return sum(float(np.sum(m * plane[rows, columns])) for rows, columns, m in self._parts(plane))
+
     def down(self, plane: Array) -> Array:
         """``matrix @ plane``: (columns, n) to (rows, n)."""
         result = _zeros(plane, (self.rows, plane.shape[1]))

@@ -6,13 +6,12 @@
   light; `glare`, what falls far from a point's image
 - behind lenslets that are not square: `lenslet_light`, one at a time; `few_points`, from which all points'
   images follow; `missing`, what lenslets beyond the border take away
+- `lenslets`: the image of a point, one chain that simulations, bounds, planes and derivatives share
 - `points`, `white`: single points, and the evenly lit main lens, before lenslets; `relay`, any light through
-  lenslets, cell by cell; `each`, where they differ, one by one; `point_light`, a point's light in their plane
-- `part_images`: points by a camera's parts; `part_points`, one by one, with derivatives by place;
-  `part_exact`, before exact lenslets; `part_lens`, without any; `part_leaning`, where parts lean;
-  `part_plane`, whole planes; `film_plane`, without lenslets; `plane_of_points`, where no image repeats;
-  `sample_images`, an operator of those; `part_sight`, `part_waves`, `passed`, `line_parts`, what all are
-  made of; `exact_waves`, light that is a sum over directions
+  lenslets, cell by cell; `point_light`, a point's light in their plane
+- `part_points`: points one by one, with derivatives by place; `part_leaning`, where parts lean; `part_plane`,
+  whole planes; `film_plane`, without lenslets; `plane_of_points`, where no image repeats; `sample_images`, an
+  operator of those; `exact_waves`, light that is a sum over directions
 - `whole_planes`: what planes by the parts of any instrument share; `part_volume`, several of them
 - `screens`: opaque sheets before the main lens; `partly`, planes whose points they hide in part
 - `regrid`: an operator of an object on another grid, moved or finer

@@ -97,8 +97,9 @@ class AnyShape(LineMatrices):
         for some in lit:
             for y, few in self._rows(xp, prepared, light, some):
                 start, key = self._start(0, y, cells[0])
-                seen = slice(max(0, -start), max(0, rows - start))
-                row = prepared[key][:, seen].swapaxes(-1, -2) @ self._beside(xp, prepared, few, cells[1])
+                matrix = prepared[key]
+                seen = xp.part(matrix, max(0, -start), min(max(0, rows - start), matrix.shape[1]), 1)
+                row = seen.swapaxes(-1, -2) @ self._beside(xp, prepared, few, cells[1])
                 total = total + xp.overlap_add(row[None], [max(0, start)], rows, -2)
         return total
 
@@ -109,7 +110,7 @@ class AnyShape(LineMatrices):
         seen: dict[int, list[tuple[float, list[Lenslet], Array]]] = {}
         for y, row in groupby(some, lambda one: one.y):
             members = list(row)
-            on_lines = prepared[ON_LINES] @ light[..., members[0].top : members[0].top + self._windows[0], :]
+            on_lines = prepared[ON_LINES] @ xp.part(light, top := members[0].top, top + self._windows[0], -2)
             for kind in sorted({one.kind for one in members}):
                 mine = [one for one in members if one.kind == kind]
                 windows = xp.windows(on_lines, [one.left for one in mine], self._windows[1], -1)
@@ -118,12 +119,12 @@ class AnyShape(LineMatrices):
         for kind, parts in seen.items():
             few, first = self._few(xp, prepared, kind, [windows for *_, windows in parts]), 0
             for y, mine, _ in parts:
-                found.setdefault(y, []).append((mine, few[first : first + len(mine)]))
+                found.setdefault(y, []).append((mine, xp.part(few, first, first + len(mine), 0)))
                 first += len(mine)
         yield from found.items()
 
     def _few(self, xp: ArrayLibrary, prepared: Numbers, kind: int, windows: Sequence[Array]) -> Array:
-        """Few numbers (n, ..., ky, kx) of light (n, ..., lines, window) on lines across lenslets of a kind."""
+        """Few numbers (n, ..., ky, kx) of light (n, ..., lines, window) on lines across lenslets."""
         lines = xp.moveaxis(xp.concatenate(windows, 0), 0, -1)
         along = prepared["along", kind] @ lines
         *batch, count, k, n = along.shape
@@ -142,7 +143,8 @@ class AnyShape(LineMatrices):
             for key, same in groupby(placed, lambda one: one[1]):
                 mine = [start for start, _ in same]
                 low, high = max(0, -max(mine)), max(0, width - min(mine))
-                behind = numbers[first : first + len(mine)] @ prepared[key][:, low:high]
+                matrix = xp.part(prepared[key], low, min(high, prepared[key].shape[1]), 1)
+                behind = xp.part(numbers, first, first + len(mine), 0) @ matrix
                 parts.append(xp.overlap_add(behind, [start + low for start in mine], width, -1))
                 first += len(mine)
         return sum(parts[1:], parts[0])

@@ -1,7 +1,7 @@
 """Array functions that the image of a point is computed with: the same lines for several libraries.
 
-NumPy runs them as they are, autograd with their derivatives. Windows of an array and sums of overlapping parts
-are each other's transpose: they alone have their derivatives by hand, since slices are slow in autograd.
+NumPy runs them as they are, autograd with their derivatives. Parts
+of arrays and sums of overlapping ones alone have their transposes by hand: slices are slow in autograd.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -50,6 +50,10 @@ class ArrayLibrary(Protocol):
         """Array with an axis in another place."""
         ...
 
+    def part(self, x: Array, start: int, stop: int, axis: int, /) -> Array:
+        """Part of an array along an axis, from a start to before a stop."""
+        ...
+
     def windows(self, x: Array, starts: Sequence[int], size: int, axis: int, /) -> Array:
         """Parts (n, ...) of an array along an axis, from each start on; zero beyond its ends."""
         ...
@@ -57,6 +61,20 @@ class ArrayLibrary(Protocol):
     def overlap_add(self, parts: Array, starts: Sequence[int], count: int, axis: int, /) -> Array:
         """Sum of parts (n, ...), each from its start on along an axis of `count` samples; cut at its ends."""
         ...
+
+
+def part(x: np.ndarray, start: int, stop: int, axis: int) -> np.ndarray:
+    """Part of an array along an axis; see `ArrayLibrary`."""
+    return x[(slice(None),) * (axis % x.ndim) + (slice(start, stop),)]
+
+
+def _placed(x: np.ndarray, start: int, count: int, axis: int) -> np.ndarray:
+    """Array between zeros along an axis of `count` samples: the transpose of `part`."""
+    shape = list(x.shape)
+    shape[axis] = count
+    found = np.zeros(shape, x.dtype)
+    found[(slice(None),) * (axis % x.ndim) + (slice(start, start + x.shape[axis]),)] = x
+    return found
 
 
 def windows(x: np.ndarray, starts: Sequence[int], size: int, axis: int) -> np.ndarray:
@@ -98,6 +116,7 @@ class NumPy:
     concatenate = staticmethod(np.concatenate)
     sum = staticmethod(np.sum)
     moveaxis = staticmethod(np.moveaxis)
+    part = staticmethod(part)
     windows = staticmethod(windows)
     overlap_add = staticmethod(overlap_add)
 
@@ -116,10 +135,17 @@ class _Differentiable:
         self.stack, self.concatenate, self.sum = anp.stack, anp.concatenate, anp.sum
         self.moveaxis = anp.moveaxis
         self.windows, self.overlap_add = primitive(windows), primitive(overlap_add)
+        self.part, self._placed = primitive(part), primitive(_placed)
+        defvjp(self.part, self._of_part)
+        defjvp(self.part, "same")
         defvjp(self.windows, self._of_windows)
         defvjp(self.overlap_add, self._of_parts)
         defjvp(self.windows, "same")
         defjvp(self.overlap_add, "same")
+
+    def _of_part(self, found: Array, x: Array, start: int, stop: int, axis: int) -> Any:
+        count = x.shape[axis]
+        return lambda by: self._placed(by, start, count, axis)
 
     def _of_windows(self, found: Array, x: Array, starts: Sequence[int], size: int, axis: int) -> Any:
         count = x.shape[axis]

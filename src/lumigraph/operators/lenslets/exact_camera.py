@@ -25,12 +25,8 @@ SMOOTH = 24
 class ExactSampledCamera(SampledCamera):
     """An exact camera with lenslets before points."""
 
-    def numbers(self, source: SourcePoint) -> dict[str, np.ndarray]:
-        """Numbers that a point's light in the lenslet plane follows from."""
-        return self.phase_numbers(source)
-
-    def phase_numbers(self, source: SourcePoint) -> dict[str, np.ndarray]:
-        """The same: phases of places, directions, the stop's smooth numbers and its edge."""
+    def numbers(self, source: SourcePoint) -> dict[str, Any]:
+        """Numbers that a point's light follows from: of places, directions, the stop and its edge."""
         light = self._oblique(source)
         nodes, _ = interpolated(SMOOTH)
         y, x = ((d[-1] + d[0]) / 2 + (d[-1] - d[0]) / 2 * nodes for d in light.directions)
@@ -67,7 +63,7 @@ class ExactSampledCamera(SampledCamera):
             y, x = light.directions
             over = light.over(y[:, None], x)
             brighter = np.log(share(self._at(source.dz))) / 2
-            smooth = self.phase_numbers(source)["smooth"]
+            smooth = self.numbers(source)["smooth"]
             self._stops[key] = over.phase, over.strength + brighter, over.bends, smooth
         return self._stops[key]
 

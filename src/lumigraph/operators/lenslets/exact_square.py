@@ -1,12 +1,12 @@
-r"""Square lenslets beyond the paraxial: matrices of each cell, sums of terms, and how these follow from a camera.
+r"""Square lenslets beyond the paraxial: matrices of each cell, sums of terms, by a camera's numbers.
 
 A matrix is a sum over lenslets l and their nodes w, of light u there,
 
 .. math:: M = \sum_l \sum_w g_w \, B_l(s, w) \, e^{i \varphi_l(s, w)} \, u_l(w)
 
 with weights g. Seen in cells, nodes and light stay where they are from one camera to another close by, while
-phases φ and what is beside them, B, change by what is smooth over a cell and a lenslet: by their values at few
-places of both. Where lenslets become wider, the light at their edges comes in.
+phases φ and what is beside them, B, change by what is smooth over a cell and a lenslet: by their values at
+few places of both. Where lenslets become wider, the light at their edges comes in.
 """
 
 from collections.abc import Iterable
@@ -253,7 +253,8 @@ class ExactSquareLenslets:
         """Amplitudes (..., terms, samples, n) along one axis of light (..., 1 or terms, places, n)."""
         side = self._sides[which]
         parts = [
-            matrix(which, number) @ light[..., side.window(number), :] for number in range(len(cells[which]))
+            matrix(which, number) @ xp.part(light, (window := side.window(number)).start, window.stop, -2)
+            for number in range(len(cells[which]))
         ]
         return xp.concatenate(parts, -2)
 

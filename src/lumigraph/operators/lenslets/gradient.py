@@ -8,6 +8,7 @@ import numpy as np
 
 from lumigraph.operators.lenslets.array_libraries import Array, Numbers, differentiable, slopes, tangent
 from lumigraph.operators.lenslets.sampled_camera import SampledCamera, SourcePoint
+from lumigraph.operators.sampling.resampling import Resampling
 from lumigraph.scene import Points
 
 Both = tuple[SampledCamera, SampledCamera]
@@ -38,7 +39,6 @@ class Gradient:
     ends: Sequence[Both]
     moved: Sequence[Moved | None]
     _by_lenslets: Slopes = field(default_factory=dict)
-    _by_wave: tuple[SourcePoint, np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         self._found = np.zeros(len(self.ends))
@@ -73,43 +73,20 @@ class Gradient:
         for key in prepared:
             by = found[key]
             self._by_lenslets[key] = self._by_lenslets[key] + by if key in self._by_lenslets else by
-        self.add_numbers(source, {name: found[name] for name in names})
+        self._add_numbers(source, {name: found[name] for name in names})
 
-    def add_numbers(self, source: SourcePoint, by: Mapping[str, np.ndarray]) -> None:
+    def _add_numbers(self, source: SourcePoint, by: Mapping[str, np.ndarray]) -> None:
         """Add slopes by what a point's light before the lenslets follows from."""
-        for name, slope in by.items():
-            if name == "wave":
-                self._add_wave(source, slope)
-        if rest := {name: slope for name, slope in by.items() if name != "wave"}:
-            for k, pair in enumerate(zip(self.ends, self.moved, strict=True)):
-                low, high = (self._numbers(end, one, rest) for end, one in both(source, *pair))
-                self._found[k] += sum(times(slope, low[name], high[name]) for name, slope in rest.items())
-
-    @staticmethod
-    def _numbers(end: SampledCamera, source: SourcePoint, names: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Numbers of a camera before a point, and of its moves where these are among the names."""
-        more = end.move_numbers(source) if "move y" in names else {}
-        return end.phase_numbers(source) | more
-
-    def _add_wave(self, source: SourcePoint, by: np.ndarray) -> None:
-        """Add slopes by the wave in the main lens, of one depth or field after the other."""
-        if self._by_wave is not None and self.own.seen_from(self._by_wave[0]) == self.own.seen_from(source):
-            self._by_wave = source, self._by_wave[1] + by
-            return
-        self._leave()
-        self._by_wave = source, by
-
-    def _leave(self) -> None:
-        """Follow slopes by the wave to the cameras."""
-        if self._by_wave is not None:
-            source, by = self._by_wave
-            for k, pair in enumerate(zip(self.ends, self.moved, strict=True)):
-                self._found[k] += times(by, *(end.wave(one) for end, one in both(source, *pair)))
-            self._by_wave = None
+        moves = "move y" in by
+        for k, pair in enumerate(zip(self.ends, self.moved, strict=True)):
+            low, high = (
+                end.numbers(one) | (end.move_numbers(one) if moves else {})
+                for end, one in both(source, *pair)
+            )
+            self._found[k] += sum(times(slope, low[name], high[name]) for name, slope in by.items())
 
     def along(self) -> np.ndarray:
         """(n,), changes of the number from the first to the last camera of each pair."""
-        self._leave()
         for keys in self.own.lenslets.grouped(self._by_lenslets):
             for k, change in enumerate(self._through_lenslets(keys)):
                 self._found[k] += change
@@ -185,7 +162,7 @@ class Tangent:
     def intensity(self, source: SourcePoint) -> tuple[np.ndarray, np.ndarray]:
         """Intensity (y, x) of a point of 1, and its change."""
         xp, numbers = differentiable(), self.own.numbers(source)
-        changes = {name: np.zeros_like(one) for name, one in numbers.items()}
+        changes = {name: np.zeros_like(np.asarray(one)) for name, one in numbers.items()}
         for weight, ends, moved in self.pairs:
             low, high = (end.numbers(one) for end, one in both(source, ends, moved))
             changes = {name: one + weight * (high[name] - low[name]) for name, one in changes.items()}
@@ -224,7 +201,20 @@ def times(by: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
     return 0.0 if low is high else float(np.dot(np.ravel(by), np.ravel(high - low)).real)
 
 
-def read_anew(ends: Both, light: np.ndarray, weights: np.ndarray) -> float:
-    """Change of what pixels take of the same light, times weights (ny, nx)."""
-    low, high = (end.read for end in ends)
-    return 0.0 if low is high else times(weights, low.forward(light), high.forward(light))
+def read_anew(own: SampledCamera, ends: Sequence[Both], light: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(n,), changes of what pixels take of the same light, times weights (ny, nx), summed."""
+    found = np.zeros(len(ends))
+    if all(low.read is high.read for low, high in ends):
+        return found
+    if not isinstance(own.read, Resampling):  # of a turned array
+        pairs = ((low.read, high.read) for low, high in ends)
+        return np.array([
+            0.0 if low is high else times(weights, low.forward(light), high.forward(light))
+            for low, high in pairs
+        ])  # fmt: skip
+    by_y, by_x = weights @ own.read.x.right(light).T, weights.T @ own.read.y.down(light)
+    for k, (low, high) in enumerate(ends):
+        if low.read is not high.read:
+            (a, b), (c, d) = ((end.read.y, end.read.x) for end in (low, high))  # type: ignore[attr-defined]
+            found[k] = c.inner(by_y) - a.inner(by_y) + d.inner(by_x) - b.inner(by_x)
+    return found

@@ -7,6 +7,7 @@ import numpy as np
 
 from lumigraph.elements import Train
 from lumigraph.operators.lenslets import main_lens
+from lumigraph.operators.lenslets.array_libraries import NUMPY
 from lumigraph.operators.sampling import cells as _cells
 from lumigraph.operators.sampling.camera import CameraOptics
 from lumigraph.operators.sampling.optics import Optics
@@ -66,7 +67,7 @@ def amplitude(
     grid = main_lens.pupil_grid(
         camera, main_lens.samples_across(camera, spread, slack), _cells.stop_reach(lens)
     )
-    wave = main_lens.wave(camera, lens, distance, grid)
+    wave = main_lens.wave(NUMPY, main_lens.wave_numbers(camera, lens, distance, grid))
     turn = -2j * np.pi / (camera.wavelength * camera.separation)
     near = [np.flatnonzero(np.abs(at) <= widest) for at in places]
     down, across = (np.exp(turn * np.outer(at[mine], grid.y)) for at, mine in zip(places, near, strict=True))
@@ -82,7 +83,7 @@ def followed_to(camera: CameraOptics, lens: Train, distance: float, accuracy: fl
 
 
 def illuminated(optics: Optics, lens: Train, place: np.ndarray) -> IlluminatedCells:
-    """Cells that all but `LEFT_OUT` of the accuracy of a point's light lies in, imaged at a place (2,) [m]."""
+    """Cells that all but `LEFT_OUT` of the accuracy of a point's light lies in, imaged at (2,) [m]."""
     widest = min(
         farthest(optics, place[None]),
         followed_to(optics.camera, lens, optics.distance, optics.fineness.accuracy),

@@ -79,10 +79,17 @@ def one_by_one(cameras: Sequence[CameraOptics]) -> list[CameraOptics]:
         found.append((camera, array, scatter))
     moved = [one.index for *_, scatter in found for one in scatter.own if one.aside is not None]
     named = {one.index: one.index in moved for *_, scatter in found for one in scatter.own}
+    kept = [array.scatter is scatter and _names(scatter, named) for _, array, scatter in found]
     return [
-        replace(camera, array=replace(array, scatter=scatter.naming(named)))
-        for camera, array, scatter in found
+        camera if same else replace(camera, array=replace(array, scatter=scatter.naming(named)))
+        for same, (camera, array, scatter) in zip(kept, found, strict=True)
     ]
+
+
+def _names(scatter: Scatter, lenslets: dict[tuple[int, int], bool]) -> bool:
+    """Whether a scatter names these lenslets in order, and says where those stand that are marked."""
+    own = [(one.index, one.aside is not None) for one in scatter.own]
+    return own == sorted(lenslets.items())
 
 
 def bright_ones(bright: np.ndarray, accuracy: float) -> list[int]:
@@ -171,24 +178,25 @@ class IndividualLenslets(SquareLenslets):
         own = (number, columns[0]) if (number, columns[0]) in self._moved else ()
         first = (number - self._around(0, cells[0]).start) * self._step(0)
         down, across = (prepared["light", which, *own] for which in (0, 1))
-        left = down @ light[..., first : first + len(self._windows[0]), :]
+        left = down @ xp.part(light, first, first + len(self._windows[0]), -2)
         start = self._around(1, cells[1]).start
         starts = [(column - start) * self._step(1) for column in columns]
         on_nodes = xp.windows(left, starts, len(self._windows[1]), -1) @ across.swapaxes(-1, -2)
         bend = self._bend(xp, prepared["phases", number], columns)
         bend = bend.reshape((len(columns), *[1] * (len(light.shape) - 2), *bend.shape[1:]))
         behind = (on_nodes * bend) @ prepared["spread", 1, *own].swapaxes(-1, -2)
-        samples = self.optics.axes[1].samples
+        samples = self._sides[1].samples
         starts = [(column - self._reach[1] - cells[1].start) * samples for column in columns]
         beside = xp.overlap_add(behind, starts, len(cells[1]) * samples, -1)
-        first = (number - self._reach[0] - cells[0].start) * self.optics.axes[0].samples
-        seen = slice(max(0, -first), max(0, len(cells[0]) * self.optics.axes[0].samples - first))
-        return max(0, first), prepared["spread", 0, *own][seen] @ beside
+        first = (number - self._reach[0] - cells[0].start) * self._sides[0].samples
+        low, high = max(0, -first), max(0, len(cells[0]) * self._sides[0].samples - first)
+        spread = prepared["spread", 0, *own]
+        return max(0, first), xp.part(spread, low, min(high, spread.shape[0]), 0) @ beside
 
     def _bend(self, xp: ArrayLibrary, terms: Array, columns: Sequence[int]) -> Array:
         """Factors (lenslets, v, u) of light on lenslets' nodes, by terms (columns, degrees, degrees)."""
         low = min(columns) + self._reach[1]
-        mine = terms[low : max(columns) + self._reach[1] + 1]
+        mine = xp.part(terms, low, max(columns) + self._reach[1] + 1, 0)
         if len(columns) < mine.shape[0]:
             mine = xp.stack([mine[column + self._reach[1] - low] for column in columns])
         down, across = self._polynomials
@@ -237,9 +245,26 @@ class IndividualLenslets(SquareLenslets):
     def _given(self, key: Key) -> tuple[Any, ...]:
         if key[0] != "phases":
             return super()._given(key)
+        array, scatter = self.optics.array, self._scatter
         row = int(self._numbers(range(key[1], key[1] + 1), range(1))[0][0, 0])
-        array = replace(self.optics.array, scatter=self._scatter.in_row(row))
-        return self.optics.camera.wavelength, self.optics.cells.size, array
+        of = array.focal_length, array.fill_factor, array.lattice
+        chance = (
+            scatter.focal_length,
+            scatter.decentre,
+            scatter.missing,
+            scatter.seed,
+            scatter.turn,
+            scatter.form,
+        )
+        return self.optics.camera.wavelength, self.optics.cells.size, of, chance, self._own.get(row, ())
+
+    @cached_property
+    def _own(self) -> dict[int, tuple[Any, ...]]:
+        """What is given of single lenslets, by their row on the lattice."""
+        found: dict[int, tuple[Any, ...]] = {}
+        for one in self._scatter.own:
+            found[one.index[0]] = (*found.get(one.index[0], ()), one)
+        return found
 
     def _made(self, key: Key) -> np.ndarray:
         return self._phases(key[1]) if key[0] == "phases" else super()._made(key)

@@ -2,8 +2,8 @@ r"""Wave of a point of light in the main lens, on few samples across it, however
 
 Light near the image follows from samples of the wave if these stand close enough, but a stop's sharp edge has
 all frequencies: samples that are grey in proportion to their open area are right to first order in their
-pitch h alone. Here the stop's edge is smoothed by a kernel whose spectrum is 1 wherever light is followed, and
-0 where the samples' spectrum repeats, so that no sampling error is left (`band` has it along one axis). What a
+pitch alone. Here the stop's edge is smoothed by a kernel whose spectrum is 1 wherever light is followed, and
+0 where the samples' spectrum repeats, so that no sampling error is left (`band` has it along an axis). What a
 stop of radius R lets through at a distance r from its middle is
 
 .. math:: g(r) = 2\pi R \int \hat K(u) \, J_1(2\pi R u) \, J_0(2\pi r u) \, du.
@@ -11,8 +11,9 @@ stop of radius R lets through at a distance r from its middle is
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -21,6 +22,7 @@ from scipy.special import j0, j1
 from lumigraph.core.grid import Grid
 from lumigraph.elements import CircularAperture, Element, ThinLens, Train, ZernikePlate
 from lumigraph.errors import GeometryError
+from lumigraph.operators.lenslets.array_libraries import Array, ArrayLibrary, Numbers
 from lumigraph.operators.lenslets.cell_response import legendre
 from lumigraph.operators.sampling import cells as _cells
 from lumigraph.operators.sampling.band import HALF_WIDTH, kernel
@@ -70,11 +72,27 @@ class Opening:
 
     def through(self, grid: Grid) -> np.ndarray:
         """Part of the amplitude (y, x) that it lets through, with smooth edges."""
-        y, x = grid.y[:, None] - self.center[0], grid.x - self.center[1]
-        sin, cos = math.sin(self.direction), math.cos(self.direction)
-        rho = np.hypot((x * cos + y * sin) / self.axes[0], (y * cos - x * sin) / self.axes[1])
-        pitch = grid.pitch[0] / min(self.axes)
-        return smooth_edge(self.half / pitch, (rho - self.half) / pitch)
+        pitch = grid.pitch[0]
+        ratios = self.half / pitch, self.center[0] / pitch, self.center[1] / pitch
+        return _through(grid.shape[0], *(round(one, 9) for one in ratios), self.axes, self.direction)
+
+
+@lru_cache(maxsize=8)
+def _through(
+    count: int, half: float, y: float, x: float, axes: tuple[float, float], direction: float
+) -> np.ndarray:
+    """Amplitude (y, x) through an ellipse on so many samples around the axis; lengths in samples."""
+    at, sin, cos = np.arange(count) - count // 2, math.sin(direction), math.cos(direction)
+    down, across = at[:, None] - y, at - x
+    rho = np.hypot((across * cos + down * sin) / axes[0], (down * cos - across * sin) / axes[1])
+    return smooth_edge(half * min(axes), (rho - half) * min(axes))
+
+
+@lru_cache(maxsize=8)
+def _aberrations(plate: ZernikePlate, count: int, pitch: float) -> np.ndarray:
+    """Phase (y, x) of a plate of diameter 1 on so many samples around the axis [rad]."""
+    at = (np.arange(count) - count // 2) * pitch
+    return plate.phase(at[:, None], at)
 
 
 def opening_of(lens: Train) -> Opening:
@@ -107,37 +125,43 @@ def _opening(part: Element) -> Opening | None:
     )
 
 
-def phase(camera: CameraOptics, lens: Train, distance: float, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Phase of a point's wave behind the main lens [rad], over one that converges in the lenslet plane.
+def _phase(
+    wavelength: float, separation: float, lens: Train, distance: float, y: np.ndarray, x: np.ndarray
+) -> np.ndarray:
+    """Phase of a point's wave behind the main lens [rad], over one that converges in the lenslet plane."""
+    plates = [part for part in lens.elements if isinstance(part, ZernikePlate)]
+    found = sum((part.phase(y, x) for part in plates), np.zeros(()))
+    return found + _bend(wavelength, separation, lens, distance) * (np.square(y) + np.square(x))
 
-    Parameters
-    ----------
-    distance
-        Of the point before the main lens [m].
-    y, x
-        Places that broadcast [m].
-    """
-    bend, found = 1 / distance + 1 / camera.separation, 0.0
-    for part in lens.elements:
-        if isinstance(part, ThinLens):
-            bend = bend - 1 / float(part.focal_length)
-        elif isinstance(part, ZernikePlate):
-            found = found + part.phase(y, x)
-    return found + np.pi / camera.wavelength * bend * (np.square(y) + np.square(x))
+
+def _bend(wavelength: float, separation: float, lens: Train, distance: float) -> float:
+    """Defocus of a point's wave [rad/m²]."""
+    lenses = [part for part in lens.elements if isinstance(part, ThinLens)]
+    focus = sum(1 / float(part.focal_length) for part in lenses)
+    return math.pi / wavelength * (1 / distance + 1 / separation - focus)
 
 
 def widest_ray(camera: CameraOptics, lens: Train, distance: float) -> float:
     """Farthest from its image that a ray of a point arrives in the lenslet plane [m]."""
+    return _widest_ray(camera.wavelength, camera.separation, tuple(lens.elements), distance)
+
+
+@lru_cache(maxsize=64)
+def _widest_ray(
+    wavelength: float, separation: float, elements: tuple[Element, ...], distance: float
+) -> float:
+    lens = Train(elements)
     opening = opening_of(lens)
     at = np.linspace(-1, 1, 33) * opening.half * max(opening.axes)
     y, x = np.meshgrid(at + opening.center[0], at + opening.center[1], indexing="ij")
     inside = np.hypot(y - opening.center[0], x - opening.center[1]) <= at[-1] * 1.001
     step = opening.half * 1e-3
     down, across = (
-        phase(camera, lens, distance, y + dy, x + dx) - phase(camera, lens, distance, y - dy, x - dx)
+        _phase(wavelength, separation, lens, distance, y + dy, x + dx)
+        - _phase(wavelength, separation, lens, distance, y - dy, x - dx)
         for dy, dx in ((step, 0.0), (0.0, step))
     )
-    bend = camera.wavelength * camera.separation / (2 * np.pi) / (2 * step)
+    bend = wavelength * separation / (2 * np.pi) / (2 * step)
     return bend * float(np.hypot(down, across)[inside].max())
 
 
@@ -159,16 +183,43 @@ def pupil_grid(camera: CameraOptics, samples: int, reach: float = 1.0) -> Grid:
     return Grid.square(2 * math.ceil(samples * reach / 2 + HALF_WIDTH + 1), camera.pupil_diameter / samples)
 
 
-def wave(camera: CameraOptics, lens: Train, distance: float, grid: Grid) -> np.ndarray:
-    """Wave (y, x) of a point in the main lens, of light of 1 behind a round stop of the camera's diameter.
+def wave_numbers(camera: CameraOptics, lens: Train, distance: float, grid: Grid) -> dict[str, Any]:
+    """Numbers that the wave of a point in the main lens follows from; see `wave`.
+
+    Its strength, the stop (y, x), aberrations (y, x) [rad], and the defocus at a distance of a sample [rad].
+    The wave is of light of 1 behind a round stop of the camera's diameter.
+    """
+    squared, half = camera.wavelength * camera.separation, camera.pupil_diameter / 2
+    light = math.prod(grid.pitch) / (squared * math.sqrt(math.pi) * half)
+    bend = _bend(camera.wavelength, camera.separation, lens, distance) * grid.pitch[0] ** 2
+    plates = [part for part in lens.elements if isinstance(part, ZernikePlate)]
+    parts = [_over_grid(plate, grid) for plate in plates]
+    aberrations = sum(parts[1:], parts[0]) if parts else _none(grid.shape[0])
+    stop = opening_of(lens).through(grid)
+    return {"strength": light, "stop": stop, "aberrations": aberrations, "defocus": bend}
+
+
+def wave(xp: ArrayLibrary, numbers: Numbers) -> Array:
+    """Wave (y, x) of a point in the main lens, over one that converges in the lenslet plane.
 
     Its Fourier transform, the sum of the wave times exp(-2πi ρ w/(λL)) over samples ρ, is the amplitude at w
     from the image in the lenslet plane [1/m].
     """
-    turned = np.exp(1j * phase(camera, lens, distance, grid.y[:, None], grid.x))
-    squared, half = camera.wavelength * camera.separation, camera.pupil_diameter / 2
-    light = math.prod(grid.pitch) / (squared * math.sqrt(math.pi) * half)
-    return light * opening_of(lens).through(grid) * turned
+    count = numbers["stop"].shape[0]
+    at = (np.arange(count) - count // 2) ** 2
+    phase = numbers["aberrations"] + numbers["defocus"] * xp.asarray(at[:, None] + at)
+    return (numbers["strength"] * numbers["stop"]) * xp.exp(1j * phase)
+
+
+def _over_grid(plate: ZernikePlate, grid: Grid) -> np.ndarray:
+    center = plate.center[0] / plate.diameter, plate.center[1] / plate.diameter
+    alike = replace(plate, diameter=1.0, center=center)
+    return _aberrations(alike, grid.shape[0], round(grid.pitch[0] / plate.diameter, 15))
+
+
+@lru_cache(maxsize=4)
+def _none(count: int) -> np.ndarray:
+    return np.zeros((count, count))
 
 
 def smooth_edge(radius: float, beyond: np.ndarray) -> np.ndarray:

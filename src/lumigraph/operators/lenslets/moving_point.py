@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from lumigraph.operators.lenslets import main_lens
 from lumigraph.operators.lenslets.array_libraries import NUMPY, Array, ArrayLibrary, Numbers
 from lumigraph.operators.lenslets.sampled_camera import SampledCamera, SourcePoint
 
@@ -18,9 +19,9 @@ def moving_intensity(
     own: SampledCamera, xp: ArrayLibrary, numbers: Numbers, prepared: Numbers, source: SourcePoint, lit: Any
 ) -> Array:
     """Intensity of a point of 1 and its derivatives by y, x and dz (4, y, x) [1/m], of a camera's numbers."""
-    down, across, wave = numbers["move y"], numbers["move x"], numbers["wave"]
+    down, across = numbers["move y"], numbers["move x"]
     phases = [down[k][:, None] + across[k] for k in range(3)]
-    return changed_intensity(own, xp, {**numbers, "wave": wave}, prepared, source, lit, phases)
+    return changed_intensity(own, xp, numbers, prepared, source, lit, phases)
 
 
 def changed_intensity(
@@ -32,8 +33,8 @@ def changed_intensity(
     lit: Any,
     phases: Sequence[Array],
 ) -> Array:
-    """Intensity of a point of 1 and its derivatives (n + 1, y, x) by phases (nodes, nodes) in the main lens."""
-    wave = numbers["wave"]
+    """Intensity of a point of 1 and its derivatives (n + 1, y, x) by phases in the main lens."""
+    wave = main_lens.wave(xp, numbers)
     waves = xp.stack([wave, *(1j * phase * wave for phase in phases)])
     fields = own.field(xp, {**numbers, "wave": waves}, prepared, source, lit)
     return intensities(xp, fields[0], [fields[k + 1] for k in range(len(phases))])

@@ -1,4 +1,4 @@
-r"""Single points before a camera: images, derivatives by place, and the way back to what the camera is made of.
+r"""Single points before a camera: images, derivatives by place, and their slopes by the camera's numbers.
 
 A point that moves turns the wave in the main lens: with U = A P, as `point_images` has it, it changes by
 U_k = A(i f_k P), f_k a phase of first and second order there, and the image by 2 Re(U* U_k). Images and
@@ -92,10 +92,11 @@ class PartPoints:
 
     def _see_anew(self, number: int, brighter: float, light: np.ndarray, given: np.ndarray) -> None:
         """Adds what a point's brightness and what pixels take of the light bring."""
-        for k, (both, where) in enumerate(zip(self._ends, self.moved, strict=True)):
+        for k, where in enumerate(self.moved):
             low, high = (points.intensities[number] for points in where)
             self._found[k] += brighter * (high - low)
-            self._found[k] += sum(read_anew(both, *pair) for pair in zip(light, given, strict=True))
+        for plane, slopes in zip(light, given, strict=True):
+            self._found += read_anew(self._own, self._ends, plane, slopes)
 
     def _source(self, number: int) -> SourcePoint:
         return self._sources[number]

@@ -119,7 +119,7 @@ class PointImages:
         """Raw images (k, ny, nx) of objects in which points are so many times as bright (k, points)."""
         own, *given = self.before(points)
         light = np.zeros((len(x), *own.shape))
-        for some in self._some(own, given, x):
+        for some in self._some((own, []), given, x):
             for source in some.sources:
                 _add(light, some, source, squared(some.own.own_field(source)[0]))
         return np.stack([own.read.forward(one) for one in light])
@@ -129,13 +129,14 @@ class PointImages:
         """Changes (k, ny, nx) of `forwards`."""
         own, *given = self.before(points)
         light, moved = np.zeros((2, len(x), *own.shape))
-        for some in self._some(own, given, x):
+        ends = self.ends(own)
+        for some in self._some((own, ends), given, x):
             by = Tangent.of(some.own, list(zip(change, some.ends, some.moved, strict=True)), some.sources)
             for source in some.sources:
                 for plane, one in zip((light, moved), by.intensity(source), strict=True):
                     _add(plane, some, source, one)
         found = np.stack([own.read.forward(one) for one in moved])
-        for weight, (low, high) in zip(change, self.ends(own), strict=True):
+        for weight, (low, high) in zip(change, ends, strict=True):
             if low.read is not high.read:
                 found += [weight * (high.read.forward(one) - low.read.forward(one)) for one in light]
         return found
@@ -145,26 +146,27 @@ class PointImages:
         """Transpose of `derivatives`: (n,), the sum over objects, each with its weights (k, ny, nx)."""
         own, *given = self.before(points)
         seen, light = np.stack([own.read.adjoint(one) for one in weights]), np.zeros((len(x), *own.shape))
-        found = np.zeros(len(self.pairs))
-        for some in self._some(own, given, x):
+        found, ends = np.zeros(len(self.pairs)), self.ends(own)
+        for some in self._some((own, ends), given, x):
             gradient = self.by_pairs(some.own, some.ends, some.moved)
             for source in some.sources:
                 asked = np.tensordot(some.bright(source), seen[(slice(None), *source.window)], 1)
                 _add(light, some, source, gradient.add(source, asked))
             found += gradient.along()
-        for k, both in enumerate(self.ends(own)):
-            found[k] += sum(read_anew(both, light[n], one) for n, one in enumerate(weights))
-        return found
+        return found + sum(read_anew(own, ends, light[n], one) for n, one in enumerate(weights))
 
-    def _some(self, own: SampledCamera, given: Sequence[Any], x: np.ndarray) -> Iterator[_Some]:
+    def _some(
+        self, cameras: tuple[SampledCamera, list[Both]], given: Sequence[Any], x: np.ndarray
+    ) -> Iterator[_Some]:
         """Those that shine, a few at a time, by depth."""
-        points, where = given
+        (own, ends), (points, where) = cameras, given
         order = np.argsort(points.positions[:, 2], kind="stable")
         order = order[x[:, order].any(0)]
         for k in range(0, len(order), TOGETHER):
             kept, few = order[k : k + TOGETHER], own.anew if k else own
+            mine = self.ends(few) if k and ends else ends
             moved = [one and (_only(one[0], kept), _only(one[1], kept)) for one in where]
-            yield _Some(few, self.ends(few), own.sources(_only(points, kept)), moved, x[:, kept])
+            yield _Some(few, mine, own.sources(_only(points, kept)), moved, x[:, kept])
 
     def ends(self, own: SampledCamera) -> list[Both]:
         """Cameras of each pair, sampled as another."""

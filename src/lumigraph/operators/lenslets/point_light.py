@@ -1,7 +1,7 @@
 """Light of a point in the lenslet plane, at any place there: the main lens' diffraction, in focus or not."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Protocol
 
@@ -57,22 +57,15 @@ def _round(lens: Train) -> ThinLens | None:
 def paraxial_light(
     camera: CameraOptics, distance: float, widest: float, samples: int = PUPIL
 ) -> "RoundPupilLight | SampledPupilLight":
-    """As `point_light` of a paraxial camera, with derivatives; so many samples across the lens, at least."""
+    """As `point_light` of a paraxial camera; so many samples across the lens, at least."""
     lens = _cells.lens(camera)
     if (first := _round(lens)) is not None:
         half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation
         focus = 1 / distance + 1 / camera.separation - 1 / first.focal_length
         airy = squared / half / 2
         far = airy * 2 ** (math.ceil(8 * math.log2(max(widest / airy, 1.0))) / 8)  # points share it
-        return RoundPupilLight(
-            *_radial(half, squared, np.pi / camera.wavelength * focus, far), camera, distance
-        )
+        return RoundPupilLight(_radial(half, squared, np.pi / camera.wavelength * focus, far))
     return SampledPupilLight(camera, lens, distance, widest, samples)
-
-
-def by_distance(camera: CameraOptics, distance: float, rho: np.ndarray) -> np.ndarray:
-    """How the phase at a distance rho from a lens' middle changes with that of the point [rad/m]."""
-    return -np.pi / camera.wavelength * (rho / distance) ** 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,44 +76,26 @@ class RoundPupilLight:
     ----------
     radial
         Amplitude by the distance from the image.
-    bent
-        The same, of light that is multiplied by the square of the place in the stop [m²].
-    camera, distance
-        Of a paraxial camera, those that the light is of.
     """
 
     radial: CubicSpline
-    bent: CubicSpline | None = None
-    camera: CameraOptics | None = None
-    distance: float = math.inf
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """As `PointLight.at`."""
         return self.radial(np.hypot(y[:, None], x))
 
-    def changes(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Derivatives (3, y, x) of `at` by y, x and the point's distance; of paraxial light."""
-        assert self.bent is not None  # as `paraxial_light` makes it
-        assert self.camera is not None
-        far = np.hypot(y[:, None], x)
-        slope = self.radial(far, 1) / np.where(far > 0, far, 1)
-        deeper = 1j * by_distance(self.camera, self.distance, np.ones(1)) * self.bent(far)
-        return np.stack([slope * y[:, None], slope * x, deeper])
-
 
 @lru_cache(maxsize=64)
-def _radial(half: float, squared: float, focus: float, widest: float) -> tuple[CubicSpline, CubicSpline]:
+def _radial(half: float, squared: float, focus: float, widest: float) -> CubicSpline:
     """Light behind a stop of radius `half`, with λL `squared`, as `RoundPupilLight` has it."""
     turns = (abs(focus) * half**2 + 2 * np.pi * widest * half / squared) / np.pi
     rho, weight = legendre(0, half, 64 + 2 * int(turns))
     at = np.arange(0, widest + 2 * squared / half, squared / half / 32)
     pupil = np.exp(1j * focus * rho**2) * 2 * np.pi * rho * weight / (squared * half * np.sqrt(np.pi))
-    both = np.stack([pupil.real, pupil.imag, (pupil * rho**2).real, (pupil * rho**2).imag], axis=1)
+    both = np.stack([pupil.real, pupil.imag], axis=1)
     parts = np.array_split(2 * np.pi / squared * at, math.ceil(len(at) * len(rho) / _BLOCK))
     values = np.concatenate([j0(np.outer(part, rho)) @ both for part in parts])
-    return CubicSpline(at, values[:, 0] + 1j * values[:, 1]), CubicSpline(
-        at, values[:, 2] + 1j * values[:, 3]
-    )
+    return CubicSpline(at, values[:, 0] + 1j * values[:, 1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,19 +147,3 @@ class SampledPupilLight:
             light = np.vdot(pupil, pupil).real * squared**2 / np.prod(grid.pitch)
             self._pupil.extend((grid, pupil * np.sqrt(_cells.stop_area(self.lens) / light)))
         return self._pupil[0], self._pupil[1]
-
-    def changes(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Derivatives (3, y, x) of `at` by y, x and the point's distance."""
-        grid, pupil = self.behind()
-        turn = -2j * np.pi / (self.camera.wavelength * self.camera.separation)
-        down, across = np.exp(turn * np.outer(y, grid.y)), np.exp(turn * np.outer(grid.x, x))
-        right, left = pupil @ across, pupil @ (across * grid.x[:, None])
-        wide = pupil @ (across * grid.x[:, None] ** 2)
-        deeper = 1j * by_distance(self.camera, self.distance, np.ones(1))
-        bent = (down * grid.y**2) @ right + down @ wide
-        return np.stack([(turn * down * grid.y) @ right, turn * (down @ left), deeper * bent])
-
-    def turned(self, phase: np.ndarray) -> "SampledPupilLight":
-        """How the light changes with a factor of this phase (y, x) [rad] on the pupil's grid."""
-        grid, pupil = self.behind()
-        return replace(self, _pupil=[grid, 1j * phase * pupil])

@@ -171,17 +171,6 @@ class SampledCamera:
         """Names of the lenslets' arrays that a point's light is computed with."""
         return self.lenslets.keys(source.lit.cells)
 
-    def wave(self, source: SourcePoint) -> np.ndarray:
-        """Wave (nodes, nodes) in the main lens, of a point of 1 in the place of another."""
-        if self.like is not None and self.like.before == self.before:
-            return self.like.wave(source)
-        if (key := self.seen_from(source)) not in self._waves:
-            self._waves.clear()  # one depth, or field, comes after another
-            lens, distance = self._lens(source), self._at(source.dz).distance
-            found = main_lens.wave(self.optics.camera, lens, distance, self.grid)
-            self._waves[key] = found * math.sqrt(share(self._at(source.dz)))
-        return self._waves[key]
-
     def seen_from(self, source: SourcePoint) -> tuple[float, ...]:
         """Depth, and field (y, x) if the lens changes over it: what a point's wave there follows from."""
         if not self._varies:
@@ -189,14 +178,13 @@ class SampledCamera:
         distance = self._at(source.dz).distance
         return source.dz, float(source.position[0]) / distance, float(source.position[1]) / distance
 
-    def numbers(self, source: SourcePoint) -> dict[str, np.ndarray]:
+    def numbers(self, source: SourcePoint) -> dict[str, Any]:
         """Numbers that a point's light in the lenslet plane follows from."""
-        return self.phase_numbers(source) | {"wave": self.wave(source)}
-
-    def phase_numbers(self, source: SourcePoint) -> dict[str, np.ndarray]:
-        """Numbers that the phases of a point's light follow from."""
         (down, above), (across, beside) = self.phases(source)
-        return {"y": down, "above": above, "x": across, "beside": beside}
+        optics = self._at(source.dz)
+        wave = main_lens.wave_numbers(optics.camera, self._lens(source), optics.distance, self.grid)
+        wave["strength"] = wave["strength"] * math.sqrt(share(optics))
+        return {"y": down, "above": above, "x": across, "beside": beside} | wave
 
     def lit(self, source: SourcePoint) -> Any:
         """Choice of the lenslets that a point does not leave dark."""
@@ -212,7 +200,8 @@ class SampledCamera:
         """Light (..., y, x) of a point in the lenslet plane, without the phase exp(iπw²/(λL))."""
         down = xp.exp(1j * (numbers["y"][:, None] * numbers["above"]))
         across = xp.exp(1j * (numbers["beside"][:, None] * numbers["x"]))
-        return down @ (numbers["wave"] @ across)
+        wave = numbers["wave"] if "wave" in numbers else main_lens.wave(xp, numbers)
+        return down @ (wave @ across)
 
     def field(
         self, xp: ArrayLibrary, numbers: Numbers, prepared: Numbers, source: SourcePoint, lit: Any
@@ -239,7 +228,7 @@ class SampledCamera:
         return (turn * (y - place[0]), grid.y), (turn * (x - place[1]), grid.x)
 
     def moves(self, source: SourcePoint) -> list[Phase]:
-        """Phases in the main lens as a point moves by y, x and dz, sums of one along y and one along x [rad/m].
+        """Phases in the main lens as a point moves by y, x and dz, one along y plus one along x [rad/m].
 
         How much light a sample of the object stands for, by its depth, stays as it is.
         """
@@ -266,21 +255,9 @@ class SampledCamera:
         return main_lens.pupil_grid(self.optics.camera, self.nodes, self.reach)
 
     @cached_property
-    def _waves(self) -> dict[tuple[float, ...], np.ndarray]:
-        return {}
-
-    @cached_property
     def _varies(self) -> bool:
         """Whether the main lens changes over the field."""
         return field_lenses.plate_of(self.optics.camera) is not None
-
-    @cached_property
-    def before(self) -> tuple[Any, ...]:
-        """All that waves in the main lens, and how bright they are, follow from."""
-        one = self.optics.camera
-        lens = tuple(one.lens.elements if self._varies else _cells.lens(one).elements)
-        given = one.wavelength, one.object_distance, one.separation, one.pupil_diameter, one.object_pitch
-        return lens, given, self.optics.image_scale
 
     @cached_property
     def _behind(self) -> tuple[Any, ...]:

@@ -6,9 +6,9 @@ In lengths of a lenslet's pitch p, with ω on the lenslet and σ from its middle
           e^{i \pi a (\sigma - \omega)^2} \, d\omega,
           \quad a = \frac{p^2}{\lambda b}, \quad c = \frac{p^2}{\lambda f}
 
-with the telecentric distance b, by Gauss-Legendre quadrature between its edges. Nodes, samples and the light's
-own samples are frozen in pitches, so that a camera's numbers are a and c alone, and where fill factors differ
-the nodes.
+with the telecentric distance b, by Gauss-Legendre quadrature between its edges. Nodes, samples and the
+light's own samples are frozen in pitches, so that a camera's numbers are a and c alone, and the nodes where
+fill factors differ.
 """
 
 import math
@@ -136,11 +136,11 @@ class SquareLenslets:
         parts = []
         for key, start in self._blocks(which, cells):
             if not key[-1]:
-                shape = (*light.shape[:-2], key[2] * self.optics.axes[which].samples, light.shape[-1])
+                shape = (*light.shape[:-2], key[2] * self._sides[which].samples, light.shape[-1])
                 parts.append(xp.asarray(np.zeros(shape, self.precision)))
             else:
                 matrix = prepared[key]
-                parts.append(matrix @ light[..., start : start + matrix.shape[1], :])
+                parts.append(matrix @ xp.part(light, start, start + matrix.shape[1], -2))
         return parts[0] if len(parts) == 1 else xp.concatenate(parts, -2)
 
     def _blocks(self, which: int, cells: range) -> list[tuple[Key, int]]:
@@ -157,7 +157,7 @@ class SquareLenslets:
     def _block(self, xp: ArrayLibrary, one: Array, which: int, block: tuple[int, int, int]) -> Array:
         """Matrix (samples, places) of some cells, of so many lenslets from a cell on."""
         cells, first, count = block
-        axis, size = self.optics.axes[which], cells * self.optics.axes[which].samples
+        axis, size = self._sides[which], cells * self._sides[which].samples
         starts = [(first + k - self._reach[which]) * axis.samples for k in range(count)]
         onto = xp.stack([xp.overlap_add(xp.stack([one]), [start], size, 0) for start in starts])
         step = self._step(which)
@@ -172,7 +172,7 @@ class SquareLenslets:
     def _spread(self, xp: ArrayLibrary, numbers: Numbers, which: int, *one: int) -> Array:
         """Matrix (samples of all cells that it lights, nodes) from a lenslet's nodes."""
         strength, off = numbers["strength", which], numbers["nodes", which, *one]
-        reach, axis = self._reach[which], self.optics.axes[which]
+        reach, axis = self._reach[which], self._sides[which]
         cells = np.arange(-reach, reach + 1)[:, None, None]
         apart = xp.asarray(cells + (axis.image / axis.size)[:, None]) - off
         spread = numbers["weights", which, *one][:, None, :] * xp.exp(1j * np.pi * strength * apart**2)
@@ -208,7 +208,7 @@ class SquareLenslets:
             return off
         if name == "light":
             return self._held[which](off)
-        reach, axis = self._reach[which], self.optics.axes[which]
+        reach, axis = self._reach[which], self._sides[which]
         apart = off - np.arange(-reach, reach + 1)[:, None]
         if name == "weights":
             return weight * axis.fade(apart * axis.size, axis.size)
@@ -227,6 +227,11 @@ class SquareLenslets:
         return 0.0, 0.0
 
     @cached_property
+    def _sides(self) -> tuple[CellAxis, CellAxis]:
+        """Sampling of a cell along y and along x, computed once."""
+        return self.optics.axes
+
+    @cached_property
     def _squared(self) -> float:
         """Wavelength times the telecentric distance to the image [m²]."""
         return self.optics.camera.wavelength * _cells.telecentric_distance(self.optics.camera)
@@ -240,7 +245,7 @@ class SquareLenslets:
     def _axes(self) -> tuple[CellAxis, CellAxis]:
         """Samples of the light around a lenslet, and periods of its band."""
         found = []
-        for axis in self.optics.axes:
+        for axis in self._sides:
             more = AROUND[0] + AROUND[1] * max(0.0, math.log10(1e-3 / self.optics.fineness.accuracy))
             margin = replace(axis, neighbourhood=more / axis.band / 2).margin
             steps = math.ceil(math.log(axis.band * axis.size) / math.log(WIDER) - 1e-9)
@@ -266,7 +271,7 @@ class SquareLenslets:
         """Cells beside it to which a lenslet sends light, along y and along x."""
         if self.like is not None:
             return self.like._reach
-        y, x = (math.floor(0.5 + axis.neighbourhood / axis.size + 1e-9) for axis in self.optics.axes)
+        y, x = (math.floor(0.5 + axis.neighbourhood / axis.size + 1e-9) for axis in self._sides)
         return y, x
 
     @cached_property
@@ -280,13 +285,13 @@ class SquareLenslets:
 
     def _nodes(self, which: int, focal_length: float) -> int:
         """Nodes of a quadrature across a lenslet of a focal length."""
-        axis, wavelength = self.optics.axes[which], self.optics.camera.wavelength
+        axis, wavelength = self._sides[which], self.optics.camera.wavelength
         half = self.optics.array.fill_factor * axis.size / 2
         return nodes(half, focal_length, axis, (wavelength, self._squared / wavelength))
 
     def _step(self, which: int) -> int:
         """Samples of light from a lenslet to the next."""
-        return self.optics.axes[which].points // STEP
+        return self._sides[which].points // STEP
 
     def _middles(self, which: int, mine: range) -> np.ndarray:
         """Middles of cells [m]."""

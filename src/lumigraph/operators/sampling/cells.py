@@ -199,6 +199,11 @@ def cells_of(
     camera: CameraOptics, array: LensletArray, fineness: SamplingRules, distance: float | None = None
 ) -> Cells:
     """The smallest upright rectangle that repeats the lattice, its points and its samples."""
+    return _sampled(camera, fineness, placed_cells(camera, array), distance)
+
+
+def placed_cells(camera: CameraOptics, array: LensletArray) -> Cells:
+    """Those cells, sampled as coarsely as can be."""
     lattice = array.lattice
     if lattice.layout == "hex":
         size = (math.sqrt(3) * lattice.pitch, lattice.pitch * lattice.kinds)
@@ -210,7 +215,7 @@ def cells_of(
     edge = tuple(
         _nearest(-n * s / 2, o - s / 2, s) for n, s, o in zip(count, size, lattice.origin, strict=True)
     )
-    return _sampled(camera, fineness, Cells(_pair(size), _pair(edge), _pair(count), (2, 2), (1, 1)), distance)
+    return Cells(_pair(size), _pair(edge), _pair(count), (2, 2), (1, 1))
 
 
 def bricks_of(

@@ -57,8 +57,8 @@ class Optics:
     def alike(self, camera: HasOptics) -> "Optics":
         """Of a camera that hardly differs, with as many cells, points and samples, at a depth as far away."""
         plain = camera.optics()
-        array, distance = _cells.lenslet_array(plain), self.distance
-        own, mine = _cells.cells_of(plain, array, self.fineness, distance), self.cells
+        array = _cells.lenslet_array(plain)
+        own, mine = _cells.placed_cells(plain, array), self.cells
         cells = replace(own, count=mine.count, points=mine.points, samples=mine.samples, ring=mine.ring)
         # To a quarter pitch, of which cameras beside it have as many; whole samples, however rounded.
         followed = self.followed_to or _quarters(self._aside / self.array.lattice.pitch) * (1 - 1e-9)
