@@ -100,7 +100,7 @@ class Convolution(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of `seen` and `samples`."""
+        """Shapes `seen` and `samples`."""
         return self.seen, self.samples
 
     def _forward(self, intensity: Array) -> Array:
@@ -117,12 +117,12 @@ class Convolution(Linear):
 
     @property
     def error(self) -> float:
-        """With what kernels leave."""
+        """Relative rms error of the pupil's samples and of the kernels."""
         return math.hypot(KERNELS, self.left)
 
     @property
     def memory_bytes(self) -> float:
-        """Of the transfer, and of two spectra and two windows on the way [bytes]."""
+        """Memory of the transfer, and of two spectra and two windows on the way [bytes]."""
         return self.transfer.nbytes + 4.0 * 4 * math.prod(self.window)
 
 
@@ -183,7 +183,7 @@ def object_samples(image: tuple[Span, Span], scale: float) -> Grid:
 
 
 def _varying(camera: CameraOptics, grid: Grid, dz: float, fields: Fields, accuracy: float) -> FieldOperator:
-    """Of a plane before a lens that changes over the field."""
+    """Operator of a plane before a lens that changes over the field."""
     distance = camera.object_distance + dz
     found = field_lenses.lenses(camera, fields, _seen(camera, distance), accuracy)
 
@@ -224,7 +224,7 @@ def points_image(instrument: HasOptics, points: Points) -> tuple[np.ndarray, flo
 def _points_image(
     camera: CameraOptics, positions: np.ndarray, intensities: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """By one lens for all."""
+    """Raw image of points by one lens for all, and its relative rms error."""
     total, off = np.zeros(camera.sensor.shape, np.float32), 0.0
     for dz in np.unique(positions[:, 2]):
         chosen = positions[:, 2] == dz
@@ -247,7 +247,7 @@ def _covering(places: tuple[np.ndarray, np.ndarray], pitch: float) -> tuple[Span
 
 
 def _imaging(camera: CameraOptics, here: tuple[Span, Span], dz: float) -> tuple[Convolution, Resampling]:
-    """From samples that stand for their own area of the object to the pixels."""
+    """Maps from samples that stand for their own area of the object to the pixels."""
     distance, pitch, pixels = camera.object_distance + dz, image_pitch(camera), camera.sensor.grid
     half_y, half_x = (np.array([-p / 2, p / 2]) for p in pixels.pitch)
     edges = -pixels.y[[-1, 0]] + half_y, -pixels.x[[-1, 0]] + half_x  # a readout is turned by 180°
@@ -275,7 +275,7 @@ def image_pitch(camera: CameraOptics) -> float:
 
 
 class _FollowedLight(NamedTuple):
-    """How far from the axis light is wanted and followed [m], samples across the pupil, what these leave."""
+    """Distances from the axis of light wanted and followed [m], samples across the pupil, their error."""
 
     wanted: float
     reach: float

@@ -88,7 +88,7 @@ class Products:
 def products(
     function: Function, middle: Pair, half: Pair, to: "Terms", bright: Function | None = None
 ) -> Products:
-    """Of a function of (y, x) [m], but for a part that is left out.
+    """A function of (y, x) [m] as a sum of products of one axis each, but for a part that is left out.
 
     What is left out is weighed by how `bright` it is at (y, x), a product of both axes' own.
     """
@@ -106,7 +106,7 @@ def products(
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """How many products a function of two axes is the sum of.
+    """Number of products that a function of two axes is the sum of.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class Terms:
 
     @property
     def count(self) -> int:
-        """Of nodes along an axis."""
+        """Number of nodes along an axis."""
         return 24 + math.ceil(4 * self.turns) if self.like is None else len(self.like.coefficients[0])
 
 
@@ -138,7 +138,7 @@ def interpolated(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def between(at: np.ndarray, count: int) -> np.ndarray:
-    """From values at so many of these nodes to those at places from -1 to 1: (places, count)."""
+    """Matrix (places, count) from values at so many of these nodes to those at places from -1 to 1."""
     return chebyshev.chebvander(at, count - 1) @ interpolated(count)[1]
 
 
@@ -194,7 +194,7 @@ class ExactLenslets(CellLenslets):
         return self.surface.amplitude(squared, self.width, self.focal_length)
 
     def terms(self, box: Box) -> tuple[tuple[Products, ...], list[tuple[int, ...]]]:
-        """For cells centred in a box: way to the sensor, lenslets, sphere; and numbers of their products.
+        """Sums of products for cells centred in a box (way to the sensor, lenslets, sphere), and those kept.
 
         Kept are those whose strengths' product counts.
         """
@@ -271,23 +271,23 @@ class ExactLenslets(CellLenslets):
         return products(beside, box[0], half, Terms(self._turns(far, self.L), self.least, like))
 
     def _turns(self, far: float, radius: float) -> float:
-        """Of the phase beside both axes' own, at a corner."""
+        """Turns of the phase beside both axes' own, at a corner."""
         corner = np.asarray(far)
         path = _left(lambda squared: sphere(squared, radius), corner, corner)
         return abs(float(path)) * self.k / (2 * np.pi)
 
     def count(self, box: Box) -> int:
-        """As `CellLenslets.count`."""
+        """Number of products that are kept, for cells centred in a box."""
         return len(self.terms(box)[1])
 
     def half(self, which: int) -> float:
-        """As `CellLenslets.half`; of glass, of what is seen of it."""
+        """Half of a lenslet's side [m]; of glass, of what is seen of it."""
         return self._half
 
     def kernel(
         self, which: int, places: tuple[np.ndarray, ...], place: float = 0.0, box: Box = MIDDLE
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As `CellLenslets.kernel`: (terms, ...), whose products are added up."""
+        """Phase [rad] and factors (terms, ...), whose products of both axes are added up."""
         (image, at, off), (parts, terms) = places, self.terms(box)
         apart, there = self.scale * image - at + (self.scale - 1) * place, at + place
         way, lenslet, curved, *mixed = (
@@ -307,7 +307,7 @@ class ExactLenslets(CellLenslets):
         return self.k * path, beside / math.sqrt(math.prod(self.optics))
 
     def _places(self, which: int, places: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-        """What each sum of products depends on, of ways, places in lenslets and places from the axis."""
+        """Arguments of each sum of products, of ways, places in lenslets and places from the axis [m]."""
         return places
 
     def _along_axis(
@@ -330,7 +330,7 @@ class CurvedGlassLenslets(ExactLenslets):
         return (self.surface.index - 1) * self._curved(squared)[0]
 
     def _bright(self, squared: np.ndarray) -> Any:
-        """Of light along the axis that goes on along it: no power is lost where it is refracted."""
+        """Amplitude of light along the axis that goes on along it: no power is lost where it is refracted."""
         sag, cosine, _ = self._curved(squared)
         turned = self._turned(cosine)
         return np.sqrt(cosine / turned) / cosine * (turned + cosine) / 2 * self.b / (self.b + sag)
@@ -350,7 +350,7 @@ class CurvedGlassLenslets(ExactLenslets):
         return (*super()._parts(box, like[:3]), self._mixed(box, 0, like[3]), self._mixed(box, 1, like[4]))
 
     def _mixed(self, box: Box, which: int, like: Products | None) -> Products:
-        """What the sagitta along one axis does to ways along the other."""
+        """Sum of products by which the sagitta along one axis changes ways along the other."""
         (middle, half), other = self._ways(box), 1 - which
 
         def beside(*places: np.ndarray) -> np.ndarray:
@@ -373,7 +373,7 @@ class CurvedGlassLenslets(ExactLenslets):
         )
 
     def _longer(self, off: np.ndarray, apart: np.ndarray) -> np.ndarray:
-        """How much longer a way across is from a place in front of the vertex' plane, than both alone [m]."""
+        """Extra length of a way across from a place in front of the vertex' plane, beyond both alone [m]."""
         squared, ahead = apart**2, self.b + self._curved(off**2)[0]
         return squared / (np.sqrt(ahead**2 + squared) + ahead) - sphere(squared, self.b)
 
@@ -394,12 +394,12 @@ class CurvedGlassLenslets(ExactLenslets):
 
 
 def _left(path: Callable[[np.ndarray], np.ndarray], y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """What a path by the squared distance has beside those along both axes [m]."""
+    """Rest of a path by the squared distance, beside those along both axes [m]."""
     return path(y * y + x * x) - path(y * y) - path(x * x)
 
 
 def lenslets_of(optics: Optics) -> CellLenslets:
-    """What a camera's lenslets do to light, by its model."""
+    """Lenslets of a camera by its model: paraxial, exact, or of glass curved towards the sensor."""
     camera, (axes, array) = optics.camera, (optics.axes, optics.array)
     if camera.model == "paraxial":
         telecentric = _cells.telecentric_distance(camera)

@@ -1,12 +1,12 @@
-r"""Square lenslets beyond the paraxial: matrices of each cell, sums of terms, and how these follow from a camera.
+r"""Square lenslets beyond the paraxial: matrices of each cell, sums of terms, as they follow from a camera.
 
 A matrix is a sum over lenslets l and their nodes w, of light u there,
 
 .. math:: M = \sum_l \sum_w g_w \, B_l(s, w) \, e^{i \varphi_l(s, w)} \, u_l(w)
 
 with weights g. Seen in cells, nodes and light stay where they are from one camera to another close by, while
-phases φ and what is beside them, B, change by what is smooth over a cell and a lenslet: by their values at few
-places of both. Where lenslets become wider, the light at their edges comes in.
+phases φ and what is beside them, B, change by what is smooth over a cell and a lenslet: by their values at
+few places of both. Where lenslets become wider, the light at their edges comes in.
 """
 
 from collections.abc import Iterable
@@ -37,7 +37,7 @@ Behind lenslets of f/10 changes by the wavelength are 4e-6 off with 5e-2, 1e-7 w
 
 
 class CellNumbers(NamedTuple):
-    """What the matrices of a cell follow from, as far as cameras close by differ by it.
+    """Numbers that the matrices of a cell follow from, as far as cameras close by differ by them.
 
     Parameters
     ----------
@@ -302,7 +302,7 @@ class ExactSquareLenslets:
         return which, cell, box
 
     def _box(self, rows: range, columns: range) -> Box:
-        """Where cells' centres are."""
+        """Middle and half extent of the cells' centres, along y and x [m]."""
         ends = [
             (mine.center(cells[0]), mine.center(cells[-1]))
             for mine, cells in zip(self._sides, (rows, columns), strict=True)

@@ -32,7 +32,7 @@ def changed_intensity(
     lit: Any,
     phases: Sequence[Array],
 ) -> Array:
-    """Intensity of a point of 1 and its derivatives (n + 1, y, x) by phases (nodes, nodes) in the main lens."""
+    """Intensity of a point of 1, and derivatives (n + 1, y, x) by phases (nodes, nodes) in the main lens."""
     wave = numbers["wave"]
     waves = xp.stack([wave, *(1j * phase * wave for phase in phases)])
     fields = own.field(xp, {**numbers, "wave": waves}, prepared, source, lit)

@@ -1,4 +1,4 @@
-r"""Single points before a camera: images, derivatives by place, and the way back to what the camera is made of.
+r"""Single points before a camera: images, derivatives by place, and the way back to the camera's parts.
 
 A point that moves turns the wave in the main lens: with U = A P, as `point_images` has it, it changes by
 U_k = A(i f_k P), f_k a phase of first and second order there, and the image by 2 Re(U* U_k). Images and

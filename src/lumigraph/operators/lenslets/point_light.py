@@ -34,7 +34,7 @@ class PointLight(Protocol):
 def point_light(
     camera: CameraOptics, distance: float, widest: float, place: tuple[float, float] = (0.0, 0.0)
 ) -> PointLight:
-    """Of a point at a distance from the main lens [m], followed to `widest` from its image [m].
+    """Light of a point at a distance from the main lens [m], followed to `widest` from its image [m].
 
     Where the image is makes no difference, but to the exact model: at `place` in the lenslet plane [m].
     """
@@ -57,7 +57,7 @@ def _round(lens: Train) -> ThinLens | None:
 def paraxial_light(
     camera: CameraOptics, distance: float, widest: float, samples: int = PUPIL
 ) -> "RoundPupilLight | SampledPupilLight":
-    """As `point_light` of a paraxial camera, with derivatives; so many samples across the lens, at least."""
+    """Light of a point behind a paraxial lens, with derivatives; so many samples across it, at least."""
     lens = _cells.lens(camera)
     if (first := _round(lens)) is not None:
         half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation
@@ -71,7 +71,7 @@ def paraxial_light(
 
 
 def by_distance(camera: CameraOptics, distance: float, rho: np.ndarray) -> np.ndarray:
-    """How the phase at a distance rho from a lens' middle changes with that of the point [rad/m]."""
+    """Slope of the phase at rho from a lens' middle [m] by the distance of the point [rad/m]."""
     return -np.pi / camera.wavelength * (rho / distance) ** 2
 
 
@@ -95,7 +95,7 @@ class RoundPupilLight:
     distance: float = math.inf
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """As `PointLight.at`."""
+        """Amplitude (y, x) in the lenslet plane, as of `PointLight.at`."""
         return self.radial(np.hypot(y[:, None], x))
 
     def changes(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -150,7 +150,7 @@ class SampledPupilLight:
     _pupil: list = field(default_factory=list, repr=False)
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """As `PointLight.at`."""
+        """Amplitude (y, x) in the lenslet plane, as of `PointLight.at`."""
         grid, pupil = self.behind()
         turn = -2j * np.pi / (self.camera.wavelength * self.camera.separation)
         return np.exp(turn * np.outer(y, grid.y)) @ (pupil @ np.exp(turn * np.outer(grid.x, x)))
@@ -185,6 +185,6 @@ class SampledPupilLight:
         return np.stack([(turn * down * grid.y) @ right, turn * (down @ left), deeper * bent])
 
     def turned(self, phase: np.ndarray) -> "SampledPupilLight":
-        """How the light changes with a factor of this phase (y, x) [rad] on the pupil's grid."""
+        """Change of the light with a factor of this phase (y, x) [rad] on the pupil's grid."""
         grid, pupil = self.behind()
         return replace(self, _pupil=[grid, 1j * phase * pupil])

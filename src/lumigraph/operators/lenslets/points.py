@@ -78,7 +78,7 @@ def image_and_error(camera: HasOptics, points: Points, accuracy: float) -> tuple
 
 
 def _within(optics: Optics, places: np.ndarray) -> np.ndarray:
-    """Which places (n, 2) lie in cells of the array."""
+    """True for places (n, 2) that lie in cells of the array."""
     cells = optics.cells
     low = np.array(cells.edge)
     return np.all((places >= low) & (places <= low + np.array(cells.size) * cells.count), axis=1)

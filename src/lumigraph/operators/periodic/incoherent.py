@@ -216,7 +216,7 @@ class _OffsetGroup:
 
     @property
     def _seen(self) -> tuple[slice, slice, slice]:
-        """Of the object's cells."""
+        """Slices of the object's cells."""
         return self.rows, _slice(self._span()), slice(None)
 
     def _places(self) -> Iterator[tuple[slice, slice]]:
@@ -334,7 +334,7 @@ def periodic_operator(
 
 @dataclass(frozen=True, slots=True)
 class _OperatorMaker:
-    """How an operator is made."""
+    """Settings with which an operator is made."""
 
     accuracy: float
     folder: str | PathLike[str] | None
@@ -348,7 +348,7 @@ class _OperatorMaker:
 def _varying(
     camera: CameraOptics, grid: Grid, dz: float, making: _OperatorMaker, fields: Fields | None = None
 ) -> Linear:
-    """Of a plane before a lens that changes over the field; `fields`, its own where the grid has more."""
+    """Operator of a plane before a lens that changes over the field; `fields`, its own, where given."""
     if camera.objects is not None:
         return seen_plane(
             camera, grid, dz, lambda one, seen, depth, known: _varying(one, seen, depth, making, known)
@@ -382,7 +382,7 @@ def _varying(
 
 
 def mirrored_operator(operator: PeriodicOperator, turn: Turn) -> PeriodicOperator:
-    """With the same matrices, of what the main lens makes of mirrored light."""
+    """Operator with the same matrices, of what the main lens makes of mirrored light."""
 
     def before(spread: Linear) -> Chain:
         return Chain((spread, Mirror(spread.shape[0], turn).T))

@@ -53,7 +53,7 @@ class Screen:
     distance: float
 
     def turned(self, angle: float) -> "Screen":
-        """In a frame that is turned about the axis, as lenslets are [rad]; samples get their area's share."""
+        """Screen in a frame turned about the axis, as lenslets are [rad]; samples get their area's share."""
         if not angle:
             return self
         sin, cos = math.sin(angle), math.cos(angle)
@@ -73,7 +73,7 @@ class Screen:
 
 
 class Shadow:
-    """What a screen does to the light of a plane behind it.
+    """Shadow of a screen in the light of a plane behind it.
 
     Parameters
     ----------
