@@ -1,22 +1,10 @@
-r"""Incoherent raw images of a camera without lenslets: the object convolved with the image of a point.
+"""Incoherent raw images of a camera without lenslets: the object convolved with the image of a point.
 
-In the Fresnel approximation a lens images every point of a plane alike. Of an object point at x, a distance d
-before the lens, the sensor at L receives
-
-.. math:: |h(s - M x)|^2, \quad h(s) = \int P(u) \exp\left(i\pi \frac{u^2}{\lambda}
-          \left(\frac1d + \frac1L\right) - 2\pi i \frac{s u}{\lambda L}\right) du, \quad M = -L/d
-
-with the pupil P: lens, stop and aberrations. Its Fourier transform, the optical transfer function, ends at
+In the Fresnel approximation a lens images every point of a plane alike. Its optical transfer function ends at
 D/(λL), so that samples λL/(2D) apart hold the image, whatever the object's own samples and the pixels are:
-
-1. the object's samples, or points anywhere, are brought onto those samples as band-limited points;
-2. one linear convolution, by FFTs on a window that holds every offset between object and sensor, so that
-   nothing wraps round;
-3. the band-limited image is integrated over each pixel.
-
-Steps 1 and 3 are banded matrices along each axis (`resampling`). The whole is off by 1e-5 to 1e-4 of the
-image's rms (`error`), but for light farther from its point than some 600 λL/D, where a point has 3e-4 of its
-light: what is nearer is made brighter by as much.
+object to samples, one linear convolution by FFTs, samples to pixels (docs/theory/lenslets.md). The whole is
+off by 1e-5 to 1e-4 of the image's rms (`error`), but for light farther from its point than some 600 λL/D,
+where a point has 3e-4 of its light: what is nearer is made brighter by as much.
 
 Goodman, *Introduction to Fourier Optics*, sections 6.1 to 6.3.
 """
@@ -196,7 +184,7 @@ def _varying(camera: CameraOptics, grid: Grid, dz: float, fields: Fields, accura
 
 
 def _seen(camera: CameraOptics, distance: float) -> field_lenses.Image:
-    """Images of a point by lenses of a camera; see `varying`."""
+    """Images of a point by lenses of a camera; see `field_lenses`."""
     pitch, spot = image_pitch(camera), _cells.airy(camera)
     reach = max(1.2 * _cells.blur(one, distance) for one in field_lenses.some(camera)) + TOLD * spot
     span = Span.around(-reach, reach, pitch)

@@ -1,7 +1,8 @@
 """Array functions that the image of a point is computed with: the same lines for several libraries.
 
 NumPy runs them as they are, autograd with their derivatives. Windows of an array and sums of overlapping
-parts are each other's transpose: they alone have their derivatives by hand, since slices are slow in autograd.
+parts are each other's transpose: they alone have their derivatives by hand, since slices are slow in
+autograd.
 """
 
 from collections.abc import Callable, Mapping, Sequence

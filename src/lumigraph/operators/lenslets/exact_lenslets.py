@@ -1,25 +1,10 @@
-r"""Square lenslets beyond the paraxial: exact phases and distances, as sums of products of one axis each.
+"""Square lenslets beyond the paraxial: exact phases and distances, as sums of products of one axis each.
 
-Light goes from a place w of the lenslet plane to S on the sensor by Rayleigh and Sommerfeld's first integral,
-
-.. math:: h = \frac{b}{i \lambda R^2} \Big(1 + \frac{i}{k R}\Big) e^{i k R}, \qquad R^2 = b^2 + |S - w|^2,
-
-after lenslets that are thin and free of spherical aberration: each brings the light of a point at the
-distance a before it to one point of the sensor, with 1/a = 1/f - 1/b,
-
-.. math:: t = e^{-i k [\sqrt{b^2 + v^2} - b \pm (\sqrt{a^2 + v^2} - |a|)]}.
-
-The main lens' light comes with the sphere around the middle of its stop, :math:`e^{i k \sqrt{L^2 + w^2}}`.
-Lenslets of glass take the path of their `GlassSurface` away instead, and have its amplitude and width. None of the
-three is a product of a function of y and one of x, as their paraxial forms are, but each is a sum
-of few: singular values of what is left of them beside their own axes' phases.
-
-A curved side that faces the sensor is followed where it stands (`CurvedGlassLenslets`), s before its vertex:
-
-.. math:: R^2 = (b + s)^2 + |S - v|^2, \quad t = e^{-i k n s}, \quad \frac{1}{2} (\cos\theta_t + n \cdot r)
-
-with Kirchhoff's mean of the normal's cosines with the ray along the axis and with the way. What the sagitta
-along one axis does to ways along the other is one more sum of products for each.
+Light goes to the sensor by Rayleigh and Sommerfeld's first integral, after lenslets that are thin and free of
+spherical aberration, or of glass (`GlassSurface`); a curved side that faces the sensor is followed where it
+stands (`CurvedGlassLenslets`). No way, lenslet or sphere of the main lens is a product of a function of y and
+one of x, as its paraxial form is, but each is a sum of few: singular values of what is left of it beside its
+axes' own phases. See docs/theory/lenslets.md.
 """
 
 import math

@@ -35,7 +35,7 @@ from lumigraph.scene import Points
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BlurredPoint:
-    """Image of a point, which all have, as `whole_planes.Block` has those of a cell.
+    """Image of a point, which all have, as `whole_planes.RepeatedImages` has those of a cell.
 
     Parameters
     ----------

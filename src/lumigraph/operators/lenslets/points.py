@@ -101,7 +101,7 @@ TOLD = ((0.13, -0.21), (-0.38, 0.44))
 
 
 def seen(camera: CameraOptics, distance: float, accuracy: float) -> field_lenses.Image:
-    """Images of two points amid the array by lenses of a camera; see `varying`."""
+    """Images of two points amid the array by lenses of a camera; see `field_lenses`."""
     optics = Optics.of(camera, distance, max(accuracy, TELLING))
     lenslets, pitch = relay(optics), optics.array.lattice.pitch
     middle = np.array(optics.cells.middle(optics.cells.kind))

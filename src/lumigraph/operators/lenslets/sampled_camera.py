@@ -239,7 +239,7 @@ class SampledCamera:
         return (turn * (y - place[0]), grid.y), (turn * (x - place[1]), grid.x)
 
     def moves(self, source: SourcePoint) -> list[Phase]:
-        """Phases in the main lens by a point's y, x and dz, each a sum of one along y and one along x [rad/m].
+        """Slopes of the lens' phase by a point's y, x and dz, sums of one along y and one along x [rad/m].
 
         How much light a sample of the object stands for, by its depth, stays as it is.
         """

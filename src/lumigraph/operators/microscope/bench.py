@@ -187,7 +187,7 @@ def faded(cells: int, fine: int) -> np.ndarray:
 
 
 class LensletBench:
-    """The lenslets around a point's own, and the way from there to the pixels; see `Crossed`."""
+    """The lenslets around a point's own, and the way from there to the pixels; see `SeparableLenslets`."""
 
     def __init__(
         self, objective: Objective, lenslet: Lenslet, sampling: CellSampling, reach: int, margin: float,

@@ -3,12 +3,10 @@ r"""Main lenses whose aberrations change over the field: images of all their poi
 Intensity behind the lens of a field θ is linear in what that lens makes of two places of light, which is
 smooth in θ. So the images of all fields follow from those of a few, chosen ones,
 
-.. math:: A(\theta) = \sum_r \varphi_r(\theta) A_r, \quad
-          \varphi_r(\theta) = \sum_k T_{rk} \ell_k(\theta),
+.. math:: A(\theta) = \sum_r \varphi_r(\theta) A_r
 
-with Lagrange's polynomials on n × n Chebyshev nodes and the matrix T of an interpolative decomposition: the
-lenses at the nodes from those of some of them. Images of a few points behind all of them tell which,
-how many, and how far off fields between the nodes are, which is stated.
+(docs/theory/lenslets.md). Images of a few points behind them tell which, how many, and how far off fields
+between them are, which is stated.
 """
 
 import math
