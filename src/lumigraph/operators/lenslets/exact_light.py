@@ -167,7 +167,7 @@ class ObliqueLight:
 
 
 def samples(camera: CameraOptics, widest: float) -> int:
-    """Across the stop, for light that is followed so far from its image [m]."""
+    """Number of samples across the stop, for light that is followed so far from its image [m]."""
     return max(SAMPLES, math.ceil(3 * widest / _cells.airy(camera)))
 
 

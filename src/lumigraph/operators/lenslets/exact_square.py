@@ -244,7 +244,7 @@ class ExactSquareLenslets:
         return self._through(xp, lambda which, number: prepared[keys[which][number]], light, cells)
 
     def _through(self, xp: ArrayLibrary, matrix: Any, light: Array, cells: Ways) -> Array:
-        """Along y, then along x; the sum over terms."""
+        """Amplitudes by a product along y, then along x, summed over terms."""
         down = self._along(xp, matrix, 0, light[..., None, :, :], cells)
         across = self._along(xp, matrix, 1, down.swapaxes(-1, -2), cells)
         return xp.sum(across, -3).swapaxes(-1, -2)

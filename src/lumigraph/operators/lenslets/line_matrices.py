@@ -124,7 +124,7 @@ class LineMatrices:
 
     @cached_property
     def _steps(self) -> tuple[float, float]:
-        """Between the samples of light along y and x [m]: all lenslets stand on some."""
+        """Steps between the samples of light along y and x [m]: all lenslets stand on some."""
         y, x = (gap / count for gap, count in zip(self._gaps, self._between, strict=True))
         return y, x
 

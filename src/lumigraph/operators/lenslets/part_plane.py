@@ -112,7 +112,7 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
 
     @cached_property
     def _own(self) -> SampledCamera:
-        """Before points of a cell amid."""
+        """Camera before points of a cell amid."""
         middle = Points(np.array([[0.0, 0.0, self.dz]]), np.ones(1))
         camera, finer = self.images.camera, SPARE * self.images.accuracy
         beside = math.hypot(*Optics.of(camera, camera.object_distance + self.dz, finer).cells.size)

@@ -126,7 +126,7 @@ STEPS = 1 / 256, 1 / 32
 
 
 class SteppedPoints(PartPoints):
-    """Before main lenses that change over the field, or are of glass: fields are compared between places.
+    """Points before main lenses that change over the field, or are of glass: fields of places are compared.
 
     Each point comes with six others beside it, a step to either side along each axis.
     """

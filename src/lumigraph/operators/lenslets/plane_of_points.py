@@ -132,7 +132,7 @@ class PlaneOfPoints(WholePlane):
 
 
 def plane_before(images: PointImages, grid: Grid, dz: float) -> WholePlane:
-    """Before cameras that see points as `images` have them: whole where images repeat, or by points."""
+    """Plane before cameras that see points as `images` do: whole where images repeat, or by points."""
     camera = images.camera
     if one_lens(camera) and camera.array is None and camera.model == "paraxial":
         return FilmPlane(images, grid, dz)

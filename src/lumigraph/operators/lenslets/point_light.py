@@ -77,7 +77,7 @@ def by_distance(camera: CameraOptics, distance: float, rho: np.ndarray) -> np.nd
 
 @dataclass(frozen=True, slots=True)
 class RoundPupilLight:
-    """Behind a round lens: a Hankel transform, the same in all directions.
+    """Light behind a round lens: a Hankel transform, the same in all directions.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def _radial(half: float, squared: float, focus: float, widest: float) -> tuple[C
 
 @dataclass(frozen=True, slots=True)
 class SampledPupilLight:
-    """Behind any lens: a matrix Fourier transform of its pupil.
+    """Light behind any lens: a matrix Fourier transform of its pupil.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class StopEllipse:
 
     @property
     def area(self) -> float:
-        """Over the round stop's."""
+        """Area of the ellipse over the round stop's."""
         return self.along * self.across / self.round**2
 
     def transform(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -74,7 +74,7 @@ class Side:
 
     @property
     def step(self) -> float:
-        """Between samples [m]."""
+        """Distance between samples [m]."""
         return self.axis.size / self.axis.samples
 
     @property
@@ -108,12 +108,12 @@ class Side:
 
 
 def _fast(count: int) -> int:
-    """So many or a few more, which transforms are fast for."""
+    """Length, so many or a few more, for which transforms are fast."""
     return int(fft.next_fast_len(count) or count)
 
 
 def _samples(optics: Optics, which: int, farthest: float) -> int:
-    """Along a cell, for fringes of light from `farthest` apart [m]; lenslets stand whole samples apart."""
+    """Samples along a cell, for fringes of light `farthest` apart [m]; lenslets stand whole samples apart."""
     axis, lattice = optics.axes[which], optics.array.lattice
     squared = optics.camera.wavelength * _cells.telecentric_distance(optics.camera)
     least = max(axis.samples, farthest * axis.size / squared)

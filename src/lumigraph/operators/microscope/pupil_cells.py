@@ -216,7 +216,7 @@ class ColumnImages(RepeatedImages):
 
     @property
     def _samples(self) -> int:
-        """Along a cell."""
+        """Number of samples along a cell."""
         return self.columns[0].behind.images.layout.sampling.pixels
 
     def _inside(self, cells: int) -> tuple[slice, slice]:

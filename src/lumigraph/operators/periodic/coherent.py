@@ -92,7 +92,7 @@ def _on_sensor(camera: CameraOptics, modes: np.ndarray, grid: Grid, distance: fl
 
 
 def _farthest(y: np.ndarray, x: np.ndarray) -> float:
-    """Along an axis [m]."""
+    """Farthest coordinate of places along an axis [m]."""
     return float(max(np.abs(y).max(), np.abs(x).max()))
 
 
