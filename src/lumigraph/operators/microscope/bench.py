@@ -321,8 +321,8 @@ def sampled(spectrum: np.ndarray, fine: int, sampling: CellSampling) -> tuple[np
 
 
 def responses(count: int, fine: int, sampling: CellSampling) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Factors of samples along an axis of `count`, `fine` to a lenslet, and the parts of amplitudes that pixels
-    average and that samples hold, the latter squared.
+    """Factors of samples along an axis of `count`, `fine` to a lenslet, and the parts of amplitudes that
+    pixels average and that samples hold, the latter squared.
     """
     f = np.fft.fftfreq(count) * fine  # in periods of a pitch
     averaged = np.sinc(f * sampling.width)
