@@ -6,8 +6,8 @@ gives a white image and pictures of a board at drawn poses, by rays and with 1 %
 calibrated on the white image, corners are found, and `lg.metrology.board` measures the camera, told a focal
 length that is off by chance, as a data sheet's is, by ``--known`` (one standard deviation); with ``--pitch
 1e-4`` the lenslets' pitch, too, off by that part. ``--planned 8`` takes eight pictures at the poses of
-`lg.metrology.plan`, instead of five (of a camera 1.0 six) drawn ones near the plane in focus. A point that took
-no part is triangulated with the result, from places as exact as corners are.
+`lg.metrology.plan`, instead of five (of a camera 1.0 six) drawn ones near the plane in focus. A point that
+took no part is triangulated with the result, from places as exact as corners are.
 """
 
 import argparse

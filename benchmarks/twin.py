@@ -1,4 +1,4 @@
-"""A simulated bench that is out of place: how exactly `lg.metrology.twin` says so, and whether it is ever wrong.
+"""A simulated bench out of place: how exactly `lg.metrology.twin` says so, and whether it is ever wrong.
 
 ``python -m benchmarks.twin [--runs 5] [--pictures 1] [--lenslets 41] [--seed 0] [--pitch 0]`` draws ±1 degree
 of tilt about both axes, ±0.3 mm of height, ±30 µm of shift, ±5 mrad of turn and ±5 % of aperture at once,

@@ -1,4 +1,4 @@
-"""What is noted of a frame that is done, and whether what was read back is such a note."""
+"""Notes of frames that are done: their fields, and checks of what is read back."""
 
 import math
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What is known of a frame that is done.
+    """Note of a frame that is done: time, memory, files, values and warnings.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Entry:
 
 
 def is_kind(value: Any, kind: type) -> bool:
-    """Whether a value of JSON is of a type; true and false are no numbers."""
+    """True if a value of JSON is of a type; true and false are no numbers."""
     return isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
 
 
@@ -53,12 +53,12 @@ def _is_amount(value: Any) -> bool:
 
 
 def is_inside(name: str) -> bool:
-    """Whether a file's name leads into a store and not out of it."""
+    """True if a file's name leads into a store and not out of it."""
     return bool(name) and "\0" not in name and not Path(name).is_absolute() and ".." not in Path(name).parts
 
 
 def is_entry(found: Any, number: int) -> bool:
-    """Whether a note is the entry of a frame: every field is there, and of its type."""
+    """True if a note is the entry of a frame: every field is there, and of its type."""
     if not is_kind(found, dict) or set(found) != set(Entry.__slots__) or found["number"] != number:
         return False
     return (

@@ -91,7 +91,7 @@ def texts(value: Any) -> Iterator[str]:
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
-    """Whether a text is the path of a file; most texts are none, and some no path can be."""
+    """True if a text is the path of a file; most texts are none, and some no path can be."""
     try:
         return Path(path).is_file()
     except (OSError, ValueError):

@@ -112,13 +112,13 @@ class Ledger:
         return f"run of {run} frames" if is_kind(run, int) and run > 0 else "frame"
 
     def entry(self, number: int) -> Entry | None:
-        """That of a frame; None where there is none, or a damaged one."""
+        """Entry of a frame; None where there is none, or a damaged one."""
         with suppress(OSError, FormatError):
             return self._read(number)
         return None
 
     def _read(self, number: int) -> Entry:
-        """That of a frame.
+        """Entry of a frame, read from its file.
 
         Raises
         ------

@@ -26,7 +26,7 @@ def printable(text: object) -> str:
 
 
 def printable_lines(text: str) -> str:
-    """As `printable`, of a text that has lines of its own."""
+    """Text whose lines are each `printable`; its line breaks stay."""
     return "\n".join(map(printable, text.split("\n")))
 
 
@@ -42,5 +42,5 @@ def printable_json(text: str) -> str:
 
 
 def has_controls(text: str) -> bool:
-    """Whether a text has characters that `printable` escapes."""
+    """True if a text has characters that `printable` escapes."""
     return _ANY.search(text) is not None

@@ -81,7 +81,7 @@ def _zeros(values: np.ndarray) -> int:
 
 
 def _is_full(values: np.ndarray, container: int, top: int) -> bool:
-    """Whether the largest value of whole numbers is one that full pixels have."""
+    """True if `top`, the largest of whole-number values, is one that full pixels have."""
     spare = _zeros(values)
     if container > 8 and spare and top == 2**container - 2**spare:
         return True

@@ -81,7 +81,7 @@ def _letters(shape: tuple[int, ...], *, weighted: bool) -> str:
 
 
 def _fits(axes: str, shape: tuple[int, ...]) -> bool:
-    """Whether pictures are at least as wide as there are views in a row, in at most four colours."""
+    """True if pictures are at least as wide as there are views in a row, in at most four colours."""
     size = dict(zip(axes, shape, strict=True))
     few = max(size.get("v", 1), size.get("u", 1)) <= min(size["y"], size["x"])
     return few and size.get("c", 1) <= max(_COLOURS)

@@ -41,7 +41,7 @@ def from_cameras(data: np.ndarray, spacing: tuple[float, float] = (1.0, 1.0)) ->
 
 
 def in_order_of_views(cameras: np.ndarray, spacing: tuple[float, float] = (1.0, 1.0)) -> np.ndarray:
-    """What there is of each camera (row, column, ...) in the order of the views (v, u, ...), as a view of it.
+    """Values of each camera (row, column, ...) in the order of the views (v, u, ...): a view of the array.
 
     Parameters
     ----------

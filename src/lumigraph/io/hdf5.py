@@ -272,7 +272,7 @@ def _order(path: Path, file: h5py.File, name: str, dataset: h5py.Dataset, axes: 
 
 
 def _is_matlab(dataset: h5py.Dataset) -> bool:
-    """Whether MATLAB itself wrote it, by `save` with -v7.3: `h5write` leaves no mark."""
+    """True if MATLAB itself wrote a dataset, by `save` with -v7.3: `h5write` leaves no mark."""
     return "MATLAB_class" in dataset.attrs
 
 

@@ -51,7 +51,7 @@ class Declared:
 
 
 def declared(path: Any, page: tifffile.TiffPage) -> Declared | None:
-    """What the first page says of all planes; None where it says nothing.
+    """Axes and sizes of all planes as the first page declares them; None where it says nothing.
 
     Raises
     ------

@@ -132,7 +132,7 @@ def _check_packed(path: Path, most: int) -> None:
 
 
 def _packed(path: Path) -> Iterator[tuple[int, int]]:
-    """Where packed variables stand, and their bytes."""
+    """Start and size of each packed variable in the file [bytes]."""
     size, at = path.stat().st_size, _TEXT
     with path.open("rb") as file:
         order = "little" if file.read(_TEXT)[126:128] == b"IM" else "big"

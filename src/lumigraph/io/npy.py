@@ -79,7 +79,7 @@ def contents(path: Path) -> list[tuple[str, str, str]]:
 
 @contextmanager
 def _streams(path: Path) -> Iterator[dict[str, Any]]:
-    """By name: what gives the bytes stored, whether they are packed, and a stream of the array."""
+    """Arrays by name: each a function of the bytes stored, whether they are packed, and a stream."""
     with path.open("rb") as file:
         start = file.read(6)
     if path.suffix.lower() == ".npy":

@@ -56,7 +56,7 @@ def check_target(path: str | os.PathLike[str], endings: Sequence[str] = (), *, f
 
 
 def _is_zarr(entry: Path) -> bool:
-    """Whether an entry of a store is Zarr's: what describes it, chunks, or an array or a group inside."""
+    """True if an entry of a store is Zarr's: its metadata, chunks, or an array or a group inside."""
     if entry.name in _ZARR:
         return True
     if not entry.is_dir() or entry.is_symlink():
@@ -76,7 +76,7 @@ def _check_foreign(path: Path, ours: Callable[[Path], bool]) -> None:
 
 
 def is_clutter(entry: Path) -> bool:
-    """Whether an entry of a folder may go with it: file managers leave it everywhere."""
+    """True if an entry of a folder may go with it: file managers leave it everywhere."""
     return _CLUTTER.fullmatch(entry.name) is not None
 
 

@@ -68,7 +68,7 @@ def load(
 def _said(
     path: Path, file: tifffile.TiffFile, page: int | None
 ) -> tuple[ome.OmePlanes | None, Declared | None]:
-    """What the first page says of all planes: as OME-XML, or otherwise.
+    """Planes as the first page describes them, in OME-XML or otherwise.
 
     A page that the file itself holds opens whatever else is missing: then nothing is said.
     """
@@ -228,7 +228,7 @@ def _along(planes: ome.OmePlanes | None, told: Declared | None, count: int) -> s
 
 
 def _about(planes: ome.OmePlanes | None, told: Declared | None) -> dict[str, Any]:
-    """What is kept of axes and places that a stack has no fields for."""
+    """Metadata of axes and places that a stack has no fields for."""
     axes, sizes = (planes.axes, planes.counts) if planes is not None else ("", ())
     axes, sizes = (told.axes, told.sizes) if told is not None else (axes, sizes)
     found: dict[str, Any] = (

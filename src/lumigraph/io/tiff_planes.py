@@ -153,7 +153,7 @@ def _ome_reader(path: Path, file: tifffile.TiffFile, planes: ome.OmePlanes, coun
 
 
 def _renamed(path: Path, names: set[str], places: tuple[tuple[str, int], ...], count: int) -> bool:
-    """Whether the only file that is named is this one, under the name that it once had."""
+    """True if the only file that is named is this one, under the name that it once had."""
     return not _is_beside(path, next(iter(names))) and max(index for _, index in places) < count
 
 
@@ -174,7 +174,7 @@ def _bytes_of(page: tifffile.TiffPage) -> int:
 
 
 def _is_plain(page: tifffile.TiffPage) -> bool:
-    """Whether pixels stand in one piece, so that those of the next plane can follow."""
+    """True if pixels stand in one piece, so that those of the next plane can follow."""
     ends = [at + size for at, size in zip(page.dataoffsets, page.databytecounts, strict=True)]
     return (
         page.compression == 1

@@ -1,38 +1,14 @@
 """Linear image formers: from objects to raw images, and back; each is a `core.linear.Linear`.
 
-- `periodic`: `periodic_operator`, incoherent planes before a lenslet array, and its adjoint
-- `kernels`: its matrices; `optics`, what they depend on; `blocks`, how they are made, in factors; `cells`,
-  what they are matrices between; `point_images`, where they come from; `cell_response`, what lenslets do to
-  light; `glare`, what falls far from a point's image
-- behind lenslets that are not square: `lenslet_light`, one at a time; `few_points`, from which all points'
-  images follow; `missing`, what lenslets beyond the border take away
-- `lenslets`: the image of a point, one chain that simulations, bounds, planes and derivatives share
-- `points`, `white`: single points, and the evenly lit main lens, before lenslets; `relay`, any light through
-  lenslets, cell by cell; `point_light`, a point's light in their plane
-- `part_points`: points one by one, with derivatives by place; `part_leaning`, where parts lean; `part_plane`,
-  whole planes; `film_plane`, without lenslets; `plane_of_points`, where no image repeats; `sample_images`, an
-  operator of those; `exact_waves`, light that is a sum over directions
-- `whole_planes`: what planes by the parts of any instrument share; `part_volume`, several of them
-- `screens`: opaque sheets before the main lens; `partly`, planes whose points they hide in part
-- `regrid`: an operator of an object on another grid, moved or finer
-- `resampling`, `turning`: from an object's samples to points and from the image's samples to pixels
+Storeys, from the lowest; each imports only from those before it, the last two not from each other:
+
+- `sampling`: sizes decided once from plain numbers: `CameraOptics`, cells, grids, accuracies
 - `single_lens`: `single_lens_operator`, incoherent planes and points before a camera without lenslets
-- `microscope_operator`: volumes before a light-field microscope; `microscope_building`, how it is made;
-  `microscope_cell`, a lenslet and its cell; `microscope_tiles`, lenslets in tiles;
-  `microscope_kernels`, images of its points; `microscope_rays`, the same by rays; `microscope_spectrum`, the
-  lenslets' frequencies; `microscope_transforms`, to those and back; `microscope_patterns`, what they follow
-  of a cell's points; `microscope_sensor`, from those to pixels;
-  `microscope_pupil`, points by the pupil's phase; `microscope_pupil_waves`, its waves behind lenslets;
-  `pupil_points`, points by a microscope's parts; `pupil_plane`, whole planes; `pupil_cells`, their columns;
-  `microscope_pixels`, real pixels; `microscope_samples`, how many samples they need; `fourier_microscope`;
-  `fourier_points`, its points with derivatives; `fourier_changes`, by its parts; `fourier_plane`, planes
-- `exact`: lenslets and distances beyond the paraxial; `paraxial`, how far off that is
-- `varying`: main lenses whose aberrations change over the field; `let`, the share of each sample; `mirrors`,
-  what is known of one field, of those that mirror it
-- `leaning`: arrays and sensors that lean, by cameras that do not
-- `fineness`: what an accuracy asks for
-- `band`: band-limited samples along an axis, to and from points and pixels
-- `camera`: `CameraOptics`, what an operator reads of an instrument, as plain values
+- `lenslets`: images of points and planes before a camera, by any lenslets or none, with derivatives by its
+  parts; `is_possible`, where lenslets can be exact
+- `periodic`: `periodic_operator`, incoherent planes before a lenslet array, and its adjoint; white images,
+  screens, coherent light
+- `microscope`: volumes before light-field and Fourier light-field microscopes
 """
 
 from lumigraph.operators.lenslets.paraxial_error import is_possible

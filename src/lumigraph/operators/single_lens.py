@@ -1,22 +1,10 @@
-r"""Incoherent raw images of a camera without lenslets: the object convolved with the image of a point.
+"""Incoherent raw images of a camera without lenslets: the object convolved with the image of a point.
 
-In the Fresnel approximation a lens images every point of a plane alike. Of an object point at x, a distance d
-before the lens, the sensor at L receives
-
-.. math:: |h(s - M x)|^2, \quad h(s) = \int P(u) \exp\left(i\pi \frac{u^2}{\lambda}
-          \left(\frac1d + \frac1L\right) - 2\pi i \frac{s u}{\lambda L}\right) du, \quad M = -L/d
-
-with the pupil P: lens, stop and aberrations. Its Fourier transform, the optical transfer function, ends at
+In the Fresnel approximation a lens images every point of a plane alike. Its optical transfer function ends at
 D/(λL), so that samples λL/(2D) apart hold the image, whatever the object's own samples and the pixels are:
-
-1. the object's samples, or points anywhere, are brought onto those samples as band-limited points;
-2. one linear convolution, by FFTs on a window that holds every offset between object and sensor, so that
-   nothing wraps round;
-3. the band-limited image is integrated over each pixel.
-
-Steps 1 and 3 are banded matrices along each axis (`resampling`). The whole is off by 1e-5 to 1e-4 of the
-image's rms (`error`), but for light farther from its point than some 600 λL/D, where a point has 3e-4 of its
-light: what is nearer is made brighter by as much.
+object to samples, one linear convolution by FFTs, samples to pixels (docs/theory/lenslets.md). The whole is
+off by 1e-5 to 1e-4 of the image's rms (`error`), but for light farther from its point than some 600 λL/D,
+where a point has 3e-4 of its light: what is nearer is made brighter by as much.
 
 Goodman, *Introduction to Fourier Optics*, sections 6.1 to 6.3.
 """
@@ -100,7 +88,7 @@ class Convolution(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of `seen` and `samples`."""
+        """Shapes `seen` and `samples`."""
         return self.seen, self.samples
 
     def _forward(self, intensity: Array) -> Array:
@@ -117,12 +105,12 @@ class Convolution(Linear):
 
     @property
     def error(self) -> float:
-        """With what kernels leave."""
+        """Relative rms error of the pupil's samples and of the kernels."""
         return math.hypot(KERNELS, self.left)
 
     @property
     def memory_bytes(self) -> float:
-        """Of the transfer, and of two spectra and two windows on the way [bytes]."""
+        """Memory of the transfer, and of two spectra and two windows on the way [bytes]."""
         return self.transfer.nbytes + 4.0 * 4 * math.prod(self.window)
 
 
@@ -183,7 +171,7 @@ def object_samples(image: tuple[Span, Span], scale: float) -> Grid:
 
 
 def _varying(camera: CameraOptics, grid: Grid, dz: float, fields: Fields, accuracy: float) -> FieldOperator:
-    """Of a plane before a lens that changes over the field."""
+    """Operator of a plane before a lens that changes over the field."""
     distance = camera.object_distance + dz
     found = field_lenses.lenses(camera, fields, _seen(camera, distance), accuracy)
 
@@ -196,7 +184,7 @@ def _varying(camera: CameraOptics, grid: Grid, dz: float, fields: Fields, accura
 
 
 def _seen(camera: CameraOptics, distance: float) -> field_lenses.Image:
-    """Images of a point by lenses of a camera; see `varying`."""
+    """Images of a point by lenses of a camera; see `field_lenses`."""
     pitch, spot = image_pitch(camera), _cells.airy(camera)
     reach = max(1.2 * _cells.blur(one, distance) for one in field_lenses.some(camera)) + TOLD * spot
     span = Span.around(-reach, reach, pitch)
@@ -224,7 +212,7 @@ def points_image(instrument: HasOptics, points: Points) -> tuple[np.ndarray, flo
 def _points_image(
     camera: CameraOptics, positions: np.ndarray, intensities: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """By one lens for all."""
+    """Raw image of points by one lens for all, and its relative rms error."""
     total, off = np.zeros(camera.sensor.shape, np.float32), 0.0
     for dz in np.unique(positions[:, 2]):
         chosen = positions[:, 2] == dz
@@ -247,7 +235,7 @@ def _covering(places: tuple[np.ndarray, np.ndarray], pitch: float) -> tuple[Span
 
 
 def _imaging(camera: CameraOptics, here: tuple[Span, Span], dz: float) -> tuple[Convolution, Resampling]:
-    """From samples that stand for their own area of the object to the pixels."""
+    """Maps from samples that stand for their own area of the object to the pixels."""
     distance, pitch, pixels = camera.object_distance + dz, image_pitch(camera), camera.sensor.grid
     half_y, half_x = (np.array([-p / 2, p / 2]) for p in pixels.pitch)
     edges = -pixels.y[[-1, 0]] + half_y, -pixels.x[[-1, 0]] + half_x  # a readout is turned by 180°
@@ -275,7 +263,7 @@ def image_pitch(camera: CameraOptics) -> float:
 
 
 class _FollowedLight(NamedTuple):
-    """How far from the axis light is wanted and followed [m], samples across the pupil, what these leave."""
+    """Distances from the axis of light wanted and followed [m], samples across the pupil, their error."""
 
     wanted: float
     reach: float

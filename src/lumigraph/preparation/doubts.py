@@ -63,7 +63,7 @@ def doubts_of(raw: RawImage, beside: ReferenceImages, pitch: float) -> tuple[str
 
 
 def mixed_up(raw: RawImage, white: RawImage | None, pitch: float) -> str | None:
-    """What to say where the white image shows a scene and the raw image shows none.
+    """Warning where the white image shows a scene and the raw image shows none; else None.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def mixed_up(raw: RawImage, white: RawImage | None, pitch: float) -> str | None:
 
 
 def left_in(raw: RawImage, beside: ReferenceImages, pitch: float) -> str | None:
-    """What to say of an offset of the sensor that no dark image takes away.
+    """Warning of an offset of the sensor that no dark image takes away; else None.
 
     In a small tile the raw image is b + r (white - b): what remains where its pixels have no light, over
     1 - r, is b for every tile, however bright.

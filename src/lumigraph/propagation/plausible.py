@@ -1,4 +1,4 @@
-"""What speaks against a propagation's result: light that left the window, samples or angles beyond a method.
+"""Doubts about a propagation's result: light that left the window, samples or angles beyond a method.
 
 Rows and columns through the bright parts of a field stand for all of it.
 """
@@ -34,7 +34,7 @@ _LINES, _PLANES, _BINS = 48, 4, 65
 
 
 def light_left(field: Field, power: Array, distance: float) -> str | None:
-    """What is wrong where light has left the field's own window; `power` (...) is what arrived in it."""
+    """Warning where light has left the field's own window, else None; `power` (...) is what arrived in it."""
     before, after = (float(to_numpy(one).sum(dtype=np.float64)) for one in (field.power, power))
     if not before > 0 or not (lost := 1 - after / before) > LEFT:
         return None
@@ -47,7 +47,7 @@ def light_left(field: Field, power: Array, distance: float) -> str | None:
 
 
 def undersampled(field: Field) -> str | None:
-    """What is wrong where a smooth wave turns by nearly half a turn from sample to sample, or more."""
+    """Warning where a smooth wave turns by nearly half a turn from sample to sample, or more; else None."""
     for axis, name in ((0, "y"), (1, "x")):
         if field.grid.shape[axis] < FEWEST_SAMPLES:
             continue
@@ -74,7 +74,7 @@ def _turning_fast(steps: np.ndarray) -> float:
 
 
 def beyond_paraxial(method: str, field: Field, distance: float, output: Grid | None) -> str | None:
-    r"""What is wrong where the Fresnel approximation turns the light that reaches the output too far.
+    r"""Warning where the Fresnel approximation turns the light that reaches the output too far; else None.
 
     A wave of frequency f moves by r = λ z f and turns by
 

@@ -1,4 +1,4 @@
-"""Whether the views of a light field stand where their numbers say: `check_arrangement`."""
+"""Check that the views of a light field stand where their numbers say: `check_arrangement`."""
 
 import math
 import warnings
@@ -62,7 +62,7 @@ def check_arrangement(views: LightField[Any], name: str) -> None:
 
 
 def _compared(views: LightField[Any], wide: bool) -> dict[str, float] | None:
-    """How much the outer views differ from the middle one in each order; None where nothing can be said.
+    """Difference of the outer views from the middle one in each order; None where nothing can be said.
 
     Each place is moved by the slope that suits it best: orders are told apart by what no slope explains.
     """

@@ -181,7 +181,7 @@ def _locked_folder(folder: Path) -> tuple[Path, int | None]:
 
 
 def _mark(name: str) -> bytes:
-    """What a workplace of this name says of itself: another folder with a copy of it is none."""
+    """Mark of a workplace of this name: another folder with a copy of it is none."""
     return f"workplace of a writer of lumigraph, {name}; removed when the writer has ended\n".encode()
 
 
@@ -220,7 +220,7 @@ def _clear(place: Path) -> None:
 
 
 def _is_ours(folder: int, name: str) -> bool:
-    """Whether an open folder is a workplace of this user, to the last entry.
+    """True if an open folder is a workplace of this user, to the last entry.
 
     An empty one counts: its writer died before it left its mark, and only an empty folder is removed then.
     """
@@ -233,7 +233,7 @@ def _is_ours(folder: int, name: str) -> bool:
 
 
 def _marked(folder: int, name: str) -> bool:
-    """Whether the mark of this name lies in an open folder, a file of this user with no second name."""
+    """True if the mark of this name lies in an open folder, a file of this user with no second name."""
     try:
         mark = os.open(_MARK, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=folder)
     except OSError:
@@ -250,7 +250,7 @@ def _marked(folder: int, name: str) -> bool:
 
 
 def _is_aside(folder: int, inside: set[str]) -> bool:
-    """Whether what is set aside is as a writer leaves it: one folder at most, in a folder, and no links."""
+    """True if what is set aside is as a writer leaves it: one folder at most, in a folder, and no links."""
     if _OLD not in inside:
         return True
     try:

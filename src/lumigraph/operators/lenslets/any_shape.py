@@ -124,7 +124,7 @@ class AnyShape(LineMatrices):
         yield from found.items()
 
     def _few(self, xp: ArrayLibrary, prepared: Numbers, kind: int, windows: Sequence[Array]) -> Array:
-        """Few numbers (n, ..., ky, kx) of light (n, ..., lines, window) on lines across lenslets."""
+        """Few numbers (n, ..., ky, kx), of light (n, ..., lines, window) on lines of one kind's lenslets."""
         lines = xp.moveaxis(xp.concatenate(windows, 0), 0, -1)
         along = prepared["along", kind] @ lines
         *batch, count, k, n = along.shape

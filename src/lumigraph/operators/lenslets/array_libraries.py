@@ -1,7 +1,8 @@
 """Array functions that the image of a point is computed with: the same lines for several libraries.
 
-NumPy runs them as they are, autograd with their derivatives. Parts
-of arrays and sums of overlapping ones alone have their transposes by hand: slices are slow in autograd.
+NumPy runs them as they are, autograd with their derivatives. Windows of an array and sums of overlapping
+parts are each other's transpose: they alone have their derivatives by hand, since slices are slow in
+autograd.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -96,7 +97,7 @@ def overlap_add(parts: np.ndarray, starts: Sequence[int], count: int, axis: int)
 
 
 def _overlaps(starts: Sequence[int], size: int, count: int) -> list[tuple[slice, slice]]:
-    """Where parts of a size lie among so many samples, and what of each does."""
+    """Slices into `count` samples, and into each part of a size, where the two overlap."""
     found = []
     for start in starts:
         low, high = max(0, start), max(0, min(count, start + size))

@@ -1,4 +1,4 @@
-"""How images of points before a camera are sampled: with lenslets, paraxial or exact, or without."""
+"""Sampling of points' images before a camera: with lenslets, paraxial or exact, or without."""
 
 from lumigraph.operators.lenslets.exact_camera import ExactSampledCamera
 from lumigraph.operators.lenslets.no_lenslets import FilmCamera

@@ -36,7 +36,7 @@ class LensletPlaneWave:
 
     @property
     def even(self) -> tuple[bool, bool]:
-        """Whether it is the same in a mirror, up and down, and left and right."""
+        """Symmetry: True where the light is the same mirrored up and down, and mirrored left and right."""
         middle = [-f for f in self.first]
         span = [min(m, n - 1 - m) for m, n in zip(middle, self.data.shape, strict=True)]
         core = self.data[middle[0] - span[0] : middle[0] + span[0] + 1]
@@ -53,7 +53,7 @@ def wave(
     reach: Sequence[int],
     place: tuple[float, float] = (0.0, 0.0),
 ) -> LensletPlaneWave:
-    """Of a point on the axis or imaged at a place, without the phase exp(iπw²/(λL)).
+    """Light in the lenslet plane of a point imaged at a place [m], without the phase exp(iπw²/(λL)).
 
     It is wide enough for cells `reach` away.
     """

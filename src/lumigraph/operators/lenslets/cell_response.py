@@ -1,4 +1,4 @@
-r"""How light in the lenslet plane reaches one cell of the image, exactly.
+r"""Response of one cell of the image to light in the lenslet plane, lenslet by lenslet.
 
 The main lens' light has a band limit, so what it does near a cell follows from samples of it. Behind the
 lenslets it goes the distance b to the image in the Fresnel approximation,
@@ -43,7 +43,7 @@ class CellResponse:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LensletNodes:
-    """Of a quadrature along a lenslet; the last two are its edges, which weigh nothing.
+    """Nodes of a quadrature along a lenslet; the last two are its edges, which weigh nothing.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class LensletNodes:
 
 
 class CellLenslets:
-    """What a lenslet array does to the light around its cells.
+    """Lenslets of an array, as a map from the light around one of its cells to the light on it.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class CellLenslets:
         limits: tuple[Limits, Limits] = (INFINITE, INFINITE),
         place: Pair = (0.0, 0.0),
     ) -> CellResponse:
-        """Of the cell centred at (y, x) [m], behind square lenslets; others: `lenslet_light`.
+        """Response of the cell centred at (y, x) [m], behind square lenslets; others: `lenslet_light`.
 
         Only lenslets whose centres lie within the limits, along y and x from the cell's centre [m], exist.
         """
@@ -126,20 +126,20 @@ class CellLenslets:
         return times_real(total, coefficients)
 
     def count(self, box: Box) -> int:
-        """Of terms, for cells centred in a box."""
+        """Number of terms, for cells centred in a box."""
         return 1
 
     def middles(self, which: int, center: float, limits: Limits = INFINITE) -> list[float]:
-        """Of lenslets along an axis that send light to a cell, from its centre [m]."""
+        """Middles of the lenslets along an axis that send light to a cell, from its centre [m]."""
         axis, origin = self.axes[which], self.array.lattice.origin[which] - center
         return list(row(origin, self._step(which), axis.size / 2 + axis.neighbourhood, limits))
 
     def half(self, which: int) -> float:
-        """Of a square lenslet's side [m]."""
+        """Half of a square lenslet's side [m]."""
         return self.array.fill_factor * self._step(which) / 2
 
     def on_nodes(self, which: int, middle: float) -> "LensletNodes":
-        """Of a quadrature along the lenslet around a place."""
+        """Nodes of a quadrature along the lenslet around a place."""
         if (known := self._nodes.get(key := (which, round(middle / self.axes[which].size, 9)))) is None:
             axis, half, (focal_length,) = self.axes[which], self.half(which), focal_lengths(self.array)
             at, weight = legendre(-half, half, nodes(half, focal_length, axis, self.optics))
@@ -182,7 +182,7 @@ class CellLenslets:
         return found if self.pixels is None else found * self.accepted(image[:, None] - light, tilt)
 
     def accepted(self, aside: np.ndarray, tilt: float = 0.0) -> np.ndarray:
-        """What the pixels' angular response does to amplitudes that come from so far aside [m]."""
+        """Factors of amplitudes that come from so far aside [m], by the pixels' angular response."""
         if self.pixels is None:
             return np.ones_like(aside)
         response, distance = self.pixels
@@ -265,7 +265,7 @@ def _legendre(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def focal_lengths(array: LensletArray) -> tuple[float, ...]:
-    """Of each kind of lenslet [m]."""
+    """Focal length of each kind of lenslet [m]."""
     return array.focal_length if isinstance(array.focal_length, tuple) else (array.focal_length,)
 
 

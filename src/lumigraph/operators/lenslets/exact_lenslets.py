@@ -1,25 +1,10 @@
-r"""Square lenslets beyond the paraxial: exact phases and distances, as sums of products of one axis each.
+"""Square lenslets beyond the paraxial: exact phases and distances, as sums of products of one axis each.
 
-Light goes from a place w of the lenslet plane to S on the sensor by Rayleigh and Sommerfeld's first integral,
-
-.. math:: h = \frac{b}{i \lambda R^2} \Big(1 + \frac{i}{k R}\Big) e^{i k R}, \qquad R^2 = b^2 + |S - w|^2,
-
-after lenslets that are thin and free of spherical aberration: each brings the light of a point at the
-distance a before it to one point of the sensor, with 1/a = 1/f - 1/b,
-
-.. math:: t = e^{-i k [\sqrt{b^2 + v^2} - b \pm (\sqrt{a^2 + v^2} - |a|)]}.
-
-The main lens' light comes with the sphere around the middle of its stop, :math:`e^{i k \sqrt{L^2 + w^2}}`.
-Lenslets of glass take the path of their `GlassSurface` away instead, and have its amplitude and width. None of the
-three is a product of a function of y and one of x, as their paraxial forms are, but each is a sum
-of few: singular values of what is left of them beside their own axes' phases.
-
-A curved side that faces the sensor is followed where it stands (`CurvedGlassLenslets`), s before its vertex:
-
-.. math:: R^2 = (b + s)^2 + |S - v|^2, \quad t = e^{-i k n s}, \quad \frac{1}{2} (\cos\theta_t + n \cdot r)
-
-with Kirchhoff's mean of the normal's cosines with the ray along the axis and with the way. What the sagitta
-along one axis does to ways along the other is one more sum of products for each.
+Light goes to the sensor by Rayleigh and Sommerfeld's first integral, after lenslets that are thin and free of
+spherical aberration, or of glass (`GlassSurface`); a curved side that faces the sensor is followed where it
+stands (`CurvedGlassLenslets`). No way, lenslet or sphere of the main lens is a product of a function of y and
+one of x, as its paraxial form is, but each is a sum of few: singular values of what is left of it beside its
+axes' own phases. See docs/theory/lenslets.md.
 """
 
 import math
@@ -88,7 +73,7 @@ class Products:
 def products(
     function: Function, middle: Pair, half: Pair, to: "Terms", bright: Function | None = None
 ) -> Products:
-    """Of a function of (y, x) [m], but for a part that is left out.
+    """A function of (y, x) [m] as a sum of products of one axis each, but for a part that is left out.
 
     What is left out is weighed by how `bright` it is at (y, x), a product of both axes' own.
     """
@@ -106,7 +91,7 @@ def products(
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """How many products a function of two axes is the sum of.
+    """Number of products that a function of two axes is the sum of.
 
     Parameters
     ----------
@@ -124,7 +109,7 @@ class Terms:
 
     @property
     def count(self) -> int:
-        """Of nodes along an axis."""
+        """Number of nodes along an axis."""
         return 24 + math.ceil(4 * self.turns) if self.like is None else len(self.like.coefficients[0])
 
 
@@ -138,7 +123,7 @@ def interpolated(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def between(at: np.ndarray, count: int) -> np.ndarray:
-    """From values at so many of these nodes to those at places from -1 to 1: (places, count)."""
+    """Matrix (places, count) from values at so many of these nodes to those at places from -1 to 1."""
     return chebyshev.chebvander(at, count - 1) @ interpolated(count)[1]
 
 
@@ -194,7 +179,7 @@ class ExactLenslets(CellLenslets):
         return self.surface.amplitude(squared, self.width, self.focal_length)
 
     def terms(self, box: Box) -> tuple[tuple[Products, ...], list[tuple[int, ...]]]:
-        """For cells centred in a box: way to the sensor, lenslets, sphere; and numbers of their products.
+        """Sums of products for cells centred in a box (way to the sensor, lenslets, sphere), and those kept.
 
         Kept are those whose strengths' product counts.
         """
@@ -271,23 +256,23 @@ class ExactLenslets(CellLenslets):
         return products(beside, box[0], half, Terms(self._turns(far, self.L), self.least, like))
 
     def _turns(self, far: float, radius: float) -> float:
-        """Of the phase beside both axes' own, at a corner."""
+        """Turns of the phase beside both axes' own, at a corner."""
         corner = np.asarray(far)
         path = _left(lambda squared: sphere(squared, radius), corner, corner)
         return abs(float(path)) * self.k / (2 * np.pi)
 
     def count(self, box: Box) -> int:
-        """As `CellLenslets.count`."""
+        """Number of products that are kept, for cells centred in a box."""
         return len(self.terms(box)[1])
 
     def half(self, which: int) -> float:
-        """As `CellLenslets.half`; of glass, of what is seen of it."""
+        """Half of a lenslet's side [m]; of glass, of what is seen of it."""
         return self._half
 
     def kernel(
         self, which: int, places: tuple[np.ndarray, ...], place: float = 0.0, box: Box = MIDDLE
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As `CellLenslets.kernel`: (terms, ...), whose products are added up."""
+        """Phase [rad] and factors (terms, ...), whose products of both axes are added up."""
         (image, at, off), (parts, terms) = places, self.terms(box)
         apart, there = self.scale * image - at + (self.scale - 1) * place, at + place
         way, lenslet, curved, *mixed = (
@@ -307,7 +292,7 @@ class ExactLenslets(CellLenslets):
         return self.k * path, beside / math.sqrt(math.prod(self.optics))
 
     def _places(self, which: int, places: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-        """What each sum of products depends on, of ways, places in lenslets and places from the axis."""
+        """Arguments of each sum of products, of ways, places in lenslets and places from the axis [m]."""
         return places
 
     def _along_axis(
@@ -330,7 +315,7 @@ class CurvedGlassLenslets(ExactLenslets):
         return (self.surface.index - 1) * self._curved(squared)[0]
 
     def _bright(self, squared: np.ndarray) -> Any:
-        """Of light along the axis that goes on along it: no power is lost where it is refracted."""
+        """Amplitude of light along the axis that goes on along it: no power is lost where it is refracted."""
         sag, cosine, _ = self._curved(squared)
         turned = self._turned(cosine)
         return np.sqrt(cosine / turned) / cosine * (turned + cosine) / 2 * self.b / (self.b + sag)
@@ -350,7 +335,7 @@ class CurvedGlassLenslets(ExactLenslets):
         return (*super()._parts(box, like[:3]), self._mixed(box, 0, like[3]), self._mixed(box, 1, like[4]))
 
     def _mixed(self, box: Box, which: int, like: Products | None) -> Products:
-        """What the sagitta along one axis does to ways along the other."""
+        """Sum of products by which the sagitta along one axis changes ways along the other."""
         (middle, half), other = self._ways(box), 1 - which
 
         def beside(*places: np.ndarray) -> np.ndarray:
@@ -373,7 +358,7 @@ class CurvedGlassLenslets(ExactLenslets):
         )
 
     def _longer(self, off: np.ndarray, apart: np.ndarray) -> np.ndarray:
-        """How much longer a way across is from a place in front of the vertex' plane, than both alone [m]."""
+        """Extra length of a way across from a place in front of the vertex' plane, beyond both alone [m]."""
         squared, ahead = apart**2, self.b + self._curved(off**2)[0]
         return squared / (np.sqrt(ahead**2 + squared) + ahead) - sphere(squared, self.b)
 
@@ -394,12 +379,12 @@ class CurvedGlassLenslets(ExactLenslets):
 
 
 def _left(path: Callable[[np.ndarray], np.ndarray], y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """What a path by the squared distance has beside those along both axes [m]."""
+    """Rest of a path by the squared distance, beside those along both axes [m]."""
     return path(y * y + x * x) - path(y * y) - path(x * x)
 
 
 def lenslets_of(optics: Optics) -> CellLenslets:
-    """What a camera's lenslets do to light, by its model."""
+    """Lenslets of a camera by its model: paraxial, exact, or of glass curved towards the sensor."""
     camera, (axes, array) = optics.camera, (optics.axes, optics.array)
     if camera.model == "paraxial":
         telecentric = _cells.telecentric_distance(camera)

@@ -59,7 +59,7 @@ def radial(camera: CameraOptics, distance: float, widest: float) -> CubicSpline:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DirectionalLight:
-    """What light in some directions is, for light of 1 through the stop.
+    """Light in some directions, for light of 1 through the stop.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class DirectionalLight:
 
     @property
     def amplitude(self) -> np.ndarray:
-        """With grey samples at the stop's edge."""
+        """Complex amplitude, with grey samples at the stop's edge."""
         return np.clip(self.within, 0, 1) * np.exp(self.strength + 1j * self.phase)
 
 
@@ -111,7 +111,7 @@ class ObliqueLight:
     beyond: int = 4
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """As `PointLight.at`."""
+        """Amplitude in the lenslet plane, as of `PointLight.at`."""
         return self.beams(y, x).light
 
     def beams(self, y: np.ndarray, x: np.ndarray) -> DirectionSum:
@@ -167,7 +167,7 @@ class ObliqueLight:
 
 
 def samples(camera: CameraOptics, widest: float) -> int:
-    """Across the stop, for light that is followed so far from its image [m]."""
+    """Number of samples across the stop, for light that is followed so far from its image [m]."""
     return max(SAMPLES, math.ceil(3 * widest / _cells.airy(camera)))
 
 

@@ -1,4 +1,4 @@
-r"""Square lenslets beyond the paraxial: matrices of each cell, sums of terms, by a camera's numbers.
+r"""Square lenslets beyond the paraxial: matrices of each cell, sums of terms, as they follow from a camera.
 
 A matrix is a sum over lenslets l and their nodes w, of light u there,
 
@@ -37,7 +37,7 @@ Behind lenslets of f/10 changes by the wavelength are 4e-6 off with 5e-2, 1e-7 w
 
 
 class CellNumbers(NamedTuple):
-    """What the matrices of a cell follow from, as far as cameras close by differ by it.
+    """Numbers that the matrices of a cell follow from, as far as cameras close by differ by them.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ class ExactSquareLenslets:
         return self._through(xp, lambda which, number: prepared[keys[which][number]], light, cells)
 
     def _through(self, xp: ArrayLibrary, matrix: Any, light: Array, cells: Ways) -> Array:
-        """Along y, then along x; the sum over terms."""
+        """Amplitudes by a product along y, then along x, summed over terms."""
         down = self._along(xp, matrix, 0, light[..., None, :, :], cells)
         across = self._along(xp, matrix, 1, down.swapaxes(-1, -2), cells)
         return xp.sum(across, -3).swapaxes(-1, -2)
@@ -303,7 +303,7 @@ class ExactSquareLenslets:
         return which, cell, box
 
     def _box(self, rows: range, columns: range) -> Box:
-        """Where cells' centres are."""
+        """Middle and half extent of the cells' centres, along y and x [m]."""
         ends = [
             (mine.center(cells[0]), mine.center(cells[-1]))
             for mine, cells in zip(self._sides, (rows, columns), strict=True)

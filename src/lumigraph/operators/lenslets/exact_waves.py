@@ -43,7 +43,7 @@ class DirectionSum:
 
     @classmethod
     def of(cls, places: Both, directions: Both, stop: np.ndarray, bends: np.ndarray) -> "DirectionSum":
-        """Of all directions, at places."""
+        """Light of all directions together, at places."""
         left = np.exp(1j * np.outer(places[0], directions[0]))
         right = np.exp(1j * np.outer(directions[1], places[1]))
         above = np.stack([one @ right for one in _each(stop, bends)])
@@ -56,7 +56,7 @@ class DirectionSum:
 
     @property
     def _factors(self) -> np.ndarray:
-        """Of the parts (4, y, x)."""
+        """Factors of the parts (4, y, x)."""
         y, x = self.places
         bends = np.broadcast_arrays(y[:, None] ** 2, 2 * np.outer(y, x), x**2)
         return np.stack([np.ones_like(bends[0]), *(0.5j * bend for bend in bends)])

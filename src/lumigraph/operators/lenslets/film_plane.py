@@ -35,7 +35,7 @@ from lumigraph.scene import Points
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BlurredPoint:
-    """Image of a point, which all have, as `whole_planes.Block` has those of a cell.
+    """Image of a point, which all have, as `whole_planes.RepeatedImages` has those of a cell.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class BlurredPoint:
     source: SourcePoint
 
     def add(self, light: np.ndarray, points: np.ndarray) -> None:
-        """What points (y, x) bring, to samples of the image from which half a kernel more of them go."""
+        """Add the light of points (y, x) to the image's samples, beyond which they go for half a kernel."""
         y, x = (n - 1 for n in self.kernel.shape)
         light += _inverse(_spectrum(points, points) * _spectrum(self.kernel, points), points)[y:, x:]
 
@@ -59,7 +59,7 @@ class BlurredPoint:
         points += _inverse(back, points)
 
     def asked(self, points: Sequence[np.ndarray], seen: Sequence[np.ndarray]) -> np.ndarray:
-        """As of `Block`."""
+        """Gradient by the kernel (y, x), as of `RepeatedImages.asked`."""
         both = zip(points, seen, strict=True)
         found = sum(_spectrum(self._framed(light), one) * _spectrum(one, one).conj() for one, light in both)
         y, x = self.kernel.shape
@@ -72,7 +72,7 @@ class BlurredPoint:
 
 @dataclass(frozen=True, eq=False)
 class FilmPlane(CellPlane[FilmCamera, BlurredPoint]):
-    """How a camera without lenslets sees a plane, with derivatives by what differs between pairs of cameras.
+    """Images of a plane by a camera without lenslets, with derivatives by what differs in pairs of cameras.
 
     The object's samples stay where they are, and as bright for their area, before all cameras.
 
@@ -97,7 +97,7 @@ class FilmPlane(CellPlane[FilmCamera, BlurredPoint]):
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Of a raw image and of an object."""
+        """Shapes of a raw image and of an object."""
         return self.images.shape, self.grid.shape
 
     def _whole(self) -> FilmCamera:
@@ -152,7 +152,7 @@ class FilmPlane(CellPlane[FilmCamera, BlurredPoint]):
 
     @cached_property
     def _own(self) -> FilmCamera:
-        """Of the whole image."""
+        """Camera of the whole image, if it fits in memory."""
         own = cast(FilmCamera, self.images.before(self._middle)[0])
         window = [smooth_size(n + 2 * half) for n, half in zip(own.shape, self._halves_of(own), strict=True)]
         memory.require(
@@ -214,7 +214,7 @@ def _window(points: np.ndarray) -> tuple[int, int]:
 
 
 def _spectrum(plane: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """On a window that holds all points."""
+    """Spectrum of a plane, on a window that holds all points."""
     return arrays.rfft2(plane, _window(points))
 
 

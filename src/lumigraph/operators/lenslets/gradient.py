@@ -1,4 +1,4 @@
-"""How light of points, and what is made of it, changes between cameras a little apart."""
+"""Changes of points' light, and of what is made of it, between cameras a little apart."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

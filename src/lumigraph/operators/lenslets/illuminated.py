@@ -77,13 +77,13 @@ def amplitude(
 
 
 def followed_to(camera: CameraOptics, lens: Train, distance: float, accuracy: float) -> float:
-    """How far from its image a point's light is followed [m]."""
+    """Distance from its image to which a point's light is followed [m]."""
     blur = main_lens.widest_ray(camera, lens, distance)
     return WIDER * blur + TAIL / math.sqrt(accuracy) * _cells.airy(camera)
 
 
 def illuminated(optics: Optics, lens: Train, place: np.ndarray) -> IlluminatedCells:
-    """Cells that all but `LEFT_OUT` of the accuracy of a point's light lies in, imaged at (2,) [m]."""
+    """Cells with all but `LEFT_OUT` of the accuracy of the light of a point imaged at a place (2,) [m]."""
     widest = min(
         farthest(optics, place[None]),
         followed_to(optics.camera, lens, optics.distance, optics.fineness.accuracy),

@@ -93,7 +93,7 @@ class LensletLight:
 
     @cached_property
     def around(self) -> np.ndarray:
-        """Whether points light a lenslet (rows, columns), as the table has them: within a circle."""
+        """True for points (rows, columns), as the table has them, that light a lenslet: within a circle."""
         at = [
             ((np.arange(-n, n + axis.points) + 0.5) / axis.points - 0.5) * axis.size
             for n, axis in zip(self._counts, self.axes, strict=True)
@@ -134,7 +134,7 @@ class LensletLight:
             pass
 
     def lit(self, numbers: np.ndarray, y: float, x: float) -> tuple[np.ndarray, np.ndarray]:
-        """Which of the points (n, 2) light a lenslet at (y, x) from the cell, and their light (m, q)."""
+        """Indices (m,) of the points (n, 2) that light a lenslet at (y, x) from the cell; light (m, q)."""
         table, first = self.table
         rows, columns = (
             numbers[:, k] - round(at * axis.points / axis.size) - first[k]
@@ -178,7 +178,7 @@ class LensletLight:
         return self._carriers[key]
 
     def matrices(self, y: float, x: float, focal_length: float) -> tuple[np.ndarray, ...]:
-        """From light in a lenslet at (y, x) to the few numbers on a cell: (q, numbers), or by way of fewer.
+        """Matrices from light in a lenslet at (y, x) to a cell: (q, numbers), or by way of fewer numbers.
 
         The farther a lenslet is from the cell, the less of what it sees comes there.
         """
@@ -189,7 +189,7 @@ class LensletLight:
 
     @cached_property
     def _own(self) -> float:
-        """How much a lenslet before the middle of a cell brings there of its light, at the least."""
+        """Least share of its light that a lenslet before the middle of a cell brings there."""
         matrix = self._quadrature(0.0, 0.0, focal_lengths(self.lenslets.array)[0])
         return float(np.linalg.norm(matrix)) / math.sqrt(min(matrix.shape))
 
@@ -273,7 +273,7 @@ def _by_way(matrix: np.ndarray, least: float) -> tuple[np.ndarray, ...]:
 
 
 def windows(lenslets: CellLenslets, accuracy: float) -> tuple[CellAxis, CellAxis]:
-    """Of the light around a single lenslet, in a cell's coordinates."""
+    """Axes (y, x) of the light around a single lenslet, in a cell's coordinates."""
     periods = AROUND[0] + AROUND[1] * max(0.0, math.log10(1e-3 / accuracy))
     beyond = periods / lenslets.axes[0].band / 2
     y, x = (

@@ -51,7 +51,7 @@ ON_LINES: Key = ("on lines",)
 
 @dataclass(eq=False)
 class LineMatrices:
-    """Of a camera; sampled as those of another that hardly differs, if there is one."""
+    """Matrices of a camera's lenslets; sampled as those of another that hardly differs, if there is one."""
 
     optics: Optics
     precision: type[np.complexfloating] = np.complex64
@@ -73,7 +73,7 @@ class LineMatrices:
         return self._pieces[key]
 
     def _shared(self, what: Hashable, *of: Any) -> bool:
-        """Whether a matrix is the other's, with all it follows from: cameras may differ in one kind alone."""
+        """True if a matrix is the other's, with all it follows from: cameras may differ in one kind alone."""
         assert self.like is not None
         if what == "on lines":
             return self._wide == self.like._wide
@@ -88,7 +88,7 @@ class LineMatrices:
 
     @cached_property
     def _lenslets(self) -> CellLenslets:
-        """As light is followed from them: to places around a lenslet, not around a cell of several."""
+        """Lenslets whose light is followed to places around each, not around a cell of several."""
         found, pitch = lenslets_of(self.optics), self.optics.array.lattice.pitch
         y, x = (replace(axis, size=min(axis.size, pitch)) for axis in found.axes)
         found.axes = y, x
@@ -100,7 +100,7 @@ class LineMatrices:
 
     @cached_property
     def _lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """As `CellLenslets.lines`; as many as the other's."""
+        """Lines across a lenslet, as of `CellLenslets.lines`; as many as the other's."""
         if self.like is None:
             return self._lenslets.lines
         larger = self._aperture / self.like._aperture
@@ -124,13 +124,13 @@ class LineMatrices:
 
     @cached_property
     def _steps(self) -> tuple[float, float]:
-        """Between the samples of light along y and x [m]: all lenslets stand on some."""
+        """Steps between the samples of light along y and x [m]: all lenslets stand on some."""
         y, x = (gap / count for gap, count in zip(self._gaps, self._between, strict=True))
         return y, x
 
     @property
     def _gaps(self) -> tuple[float, float]:
-        """Of lenslets, between those of neighbouring rows too [m]."""
+        """Spacing of lenslets along y and x, between those of neighbouring rows too [m]."""
         (_, step), (row, aside) = self.optics.array.lattice.basis
         return abs(row), abs(aside) or abs(step)
 
@@ -169,7 +169,7 @@ class LineMatrices:
         return np.arange(-beyond, beyond + 1) * self._steps[which]
 
     def _reach(self, which: int) -> float:
-        """How far from a lenslet's middle its light is followed on the samples [m]."""
+        """Distance from a lenslet's middle to which its light is followed on the samples [m]."""
         return self._followed[which] * self.optics.array.lattice.pitch
 
     @cached_property
@@ -191,7 +191,7 @@ class LineMatrices:
         return cells.edge[which] + (cell - cells.ring[which]) * cells.size[which] + pitch / 2, pitch
 
     def _numbers(self, rows: range, columns: range) -> tuple[range, range]:
-        """Of the samples of light around the lenslets that light some cells, along y and x."""
+        """Numbers along y and x of the samples of light around the lenslets that light some cells."""
         if self.like is not None:
             return self.like._numbers(rows, columns)
         found, members = [], self._members(rows, columns)
@@ -281,16 +281,16 @@ class LineMatrices:
         return found
 
     def _on_lines(self) -> np.ndarray:
-        """From light along y (window) to the lines across a lenslet: (lines, window)."""
+        """Matrix (lines, window) from light along y to the lines across a lenslet."""
         return self._held_at(0, self._lines[0])
 
     def _held_at(self, which: int, at: np.ndarray) -> np.ndarray:
-        """From light around a lenslet to places along an axis: (places, window)."""
+        """Matrix (places, window) from light around a lenslet to places along an axis."""
         coefficients, light = held(self._window(which), self._band(which))
         return light(at) @ coefficients
 
     def _band(self, which: int) -> float:
-        """Of the light [1/m]; on the samples, that of the other: any that holds it does."""
+        """Band of the light [1/m]; on the samples, that of the other: any that holds it does."""
         if self.like is not None:
             return self.like._band(which) * self.like._steps[which] / self._steps[which]
         return self.optics.axes[which].band
@@ -302,28 +302,28 @@ class LineMatrices:
 
     @cached_property
     def _on_chords(self) -> list[np.ndarray]:
-        """From light (window) to the nodes of a line, of each chord: (nodes, window)."""
+        """Matrices (nodes, window) from light to the nodes of a line, one for each chord."""
         if self.like is not None and self._wide == self.like._wide:
             return self.like._on_chords
         return [self._held_at(1, self._half[1] * mine.at) for mine in self._nodes[1:]]
 
     def _down(self, kind: int) -> np.ndarray:
-        """From the lines to few numbers along y, by the kind: (k, lines)."""
+        """Matrix (k, lines) from the lines to few numbers along y, by the kind."""
         return self._seen_of_lines * self._bend(self._focal[kind], self._lines[0])
 
     @cached_property
     def _seen_of_lines(self) -> np.ndarray:
-        """What all kinds share of that."""
+        """Part of `_down` that all kinds share (k, lines)."""
         lines, weight, _ = self._lines
         return self._seen(0, lines) * weight
 
     @property
     def _focal(self) -> tuple[float, ...]:
-        """Of each kind."""
+        """Focal length of each kind [m]."""
         return focal_lengths(self.optics.array)
 
     def _bend(self, focal_length: float, at: np.ndarray) -> np.ndarray:
-        """What a lenslet and the way behind it do to light at places from its middle [m]."""
+        """Factors of light at places from a lenslet's middle [m], by the lenslet and the way behind it."""
         wavelength = self._lenslets.optics[0]
         return np.exp(1j * np.pi * at**2 * (1 / self._squared - 1 / (wavelength * focal_length)))
 
@@ -337,7 +337,7 @@ class LineMatrices:
         return times_real(turn.T, sequences.T).T
 
     def _along(self) -> Iterator[tuple[int, np.ndarray]]:
-        """From light (window) on a line to few numbers along x: (lines, k, window) of kinds not shared.
+        """Kinds that are not shared, and matrices (lines, k, window) from light on a line to numbers along x.
 
         They share what goes from a line's nodes to the samples: polynomials give it for all chords, by what
         it is for the longest.
@@ -357,7 +357,7 @@ class LineMatrices:
 
     @cached_property
     def _nodes(self) -> list["_Nodes"]:
-        """Of the longest chord, and of each that differs."""
+        """Nodes of the longest chord, and of each that differs."""
         if self.like is not None:
             return self.like._nodes
         lenslets, longest = self._lenslets, self._half[1]
@@ -373,7 +373,7 @@ class LineMatrices:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Nodes:
-    """Of a quadrature along a chord: places and weights, of half the longest, and polynomials there."""
+    """Nodes of a quadrature along a chord: places and weights, of half the longest, and polynomials there."""
 
     at: np.ndarray
     weight: np.ndarray
@@ -381,7 +381,7 @@ class _Nodes:
 
     @classmethod
     def of(cls, chord: float, count: int, degrees: int) -> "_Nodes":
-        """So many, and polynomials of so many degrees."""
+        """Nodes, so many, and polynomials of so many degrees."""
         x, weight = legendre(-chord, chord, count)
         return cls(x, weight, np.polynomial.legendre.legvander(x, degrees - 1))
 

@@ -2,9 +2,9 @@ r"""Wave of a point of light in the main lens, on few samples across it, however
 
 Light near the image follows from samples of the wave if these stand close enough, but a stop's sharp edge has
 all frequencies: samples that are grey in proportion to their open area are right to first order in their
-pitch alone. Here the stop's edge is smoothed by a kernel whose spectrum is 1 wherever light is followed, and
-0 where the samples' spectrum repeats, so that no sampling error is left (`band` has it along an axis). What a
-stop of radius R lets through at a distance r from its middle is
+pitch h alone. Here the stop's edge is smoothed by a kernel whose spectrum is 1 wherever light is followed,
+and 0 where the samples' spectrum repeats, so that no sampling error is left (`band` has it along one axis).
+A stop of radius R lets through, at a distance r from its middle,
 
 .. math:: g(r) = 2\pi R \int \hat K(u) \, J_1(2\pi R u) \, J_0(2\pi r u) \, du.
 """
@@ -67,7 +67,7 @@ class Opening:
 
     @property
     def slack(self) -> float:
-        """How much closer than for a round stop samples must stand."""
+        """Factor by which samples must stand closer than for a round stop."""
         return max(self.axes) / min(self.axes)
 
     def through(self, grid: Grid) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Which lenslets an array has: alike or each its own, square or of any shape, paraxial or exact."""
+"""Choice of an array's lenslets: alike or each its own, square or of any shape, paraxial or exact."""
 
 from typing import Any
 

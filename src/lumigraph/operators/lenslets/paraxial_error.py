@@ -1,4 +1,4 @@
-"""How far off parabolic lenses and Fresnel's distances are: by exact and paraxial waves along one axis.
+"""Error of parabolic lenses and Fresnel's distances: by exact and paraxial waves along one axis.
 
 A point's image behind a few cylindrical lenslets is computed both ways, in the middle of the array and nearer
 to its edge, and both are averaged over pixels. An image of two axes is off by √2 times as much.
@@ -53,7 +53,7 @@ def interpolated_error(camera: CameraOptics) -> float:
 
 
 def field_matters(camera: CameraOptics, accuracy: float) -> bool:
-    """Whether an exact operator has to be interpolated over the field, and gains by it."""
+    """True if an exact operator has to be interpolated over the field, and gains by it."""
     off = field_error(camera)
     return off > FIELD * accuracy and interpolated_error(camera) < off
 
@@ -64,7 +64,7 @@ def left_by_field(camera: CameraOptics, accuracy: float) -> float:
 
 
 def weights(place: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of images at -NODE, 0 and NODE, for the one at a place from -1 to 1: Lagrange's parabolas."""
+    """Weights of images at -NODE, 0 and NODE, for the one at a place from -1 to 1: Lagrange's parabolas."""
     t = place / NODE
     return t * (t - 1) / 2, 1 - t * t, t * (t + 1) / 2
 
@@ -76,7 +76,7 @@ def half_field(camera: CameraOptics) -> float:
 
 
 def resolved(camera: CameraOptics, accuracy: float) -> CameraOptics:
-    """With a model that is chosen: exact where the paraxial one misses the accuracy and exact is possible."""
+    """Camera whose model is chosen: exact where the paraxial misses the accuracy and exact is possible."""
     if camera.model != "auto":
         return camera
     exact = camera.array is not None and is_possible(camera) and paraxial_error(camera) > accuracy
@@ -84,7 +84,7 @@ def resolved(camera: CameraOptics, accuracy: float) -> CameraOptics:
 
 
 def is_possible(camera: CameraOptics) -> bool:
-    """Whether lenslets can be exact: square, of one focal length, or none; behind one lens for all fields."""
+    """True if lenslets can be exact: square, of one focal length, or none; behind one lens for all fields."""
     array = camera.array
     if plate_of(camera) is not None:
         return False
@@ -93,7 +93,7 @@ def is_possible(camera: CameraOptics) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _ParaxialBench:
-    """What the estimate depends on, all in metres: plain values, as keys of what was computed."""
+    """Values that the estimate depends on, all in metres: plain, as keys of what was computed."""
 
     wavelength: float
     separation: float

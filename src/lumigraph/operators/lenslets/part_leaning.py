@@ -26,7 +26,7 @@ Other = TypeVar("Other", bound=PlaneImages)
 
 @dataclass(frozen=True, eq=False)
 class TiltedImages(Generic[Seen]):
-    """How a camera that leans sees points or planes, with derivatives by what differs between pairs of it.
+    """Images of points or planes by a camera that leans, with derivatives by what differs in pairs of it.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class TiltedImages(Generic[Seen]):
 
     @property
     def shape(self) -> Any:
-        """As of the flat cameras."""
+        """Shape as of the flat cameras."""
         return self.parts[0].shape
 
     def each(self, of: Callable[[Seen], Other]) -> "TiltedImages[Other]":
@@ -52,17 +52,17 @@ class TiltedImages(Generic[Seen]):
         return TiltedImages(tuple(map(of, self.parts)), self.weights, self.moved)
 
     def forward(self, x: Any) -> np.ndarray:
-        """As of a flat camera."""
+        """Raw image (ny, nx): those of the flat cameras, weighed and added."""
         return np.sum([weight * part.forward(x) for weight, part in self._both()], axis=0)
 
     def derivative(self, x: Any, change: np.ndarray) -> np.ndarray:
-        """As of a flat camera."""
+        """Change of the raw image (ny, nx) along a change of the pairs (n,)."""
         found = np.sum([weight * part.derivative(x, change) for weight, part in self._both()], axis=0)
         by = np.tensordot(np.asarray(change, np.float64), self.moved, 1)
         return found + np.sum([one * part.forward(x) for one, part in self._both(by)], axis=0)
 
     def gradient(self, x: Any, weights: np.ndarray) -> np.ndarray:
-        """As of a flat camera."""
+        """Gradient by the pairs (n,) of a weighed raw image: the transpose of `derivative`."""
         given = np.asarray(weights, np.float64)
         found = np.sum([part.gradient(x, weight * given) for weight, part in self._both()], axis=0)
         if not self.moved.any():
@@ -94,17 +94,17 @@ class TiltedPoints:
 
     @property
     def depths(self) -> Sequence[float]:
-        """As of a flat camera."""
+        """Depths of the points, as of a flat camera [m]."""
         return self.each[0].depths
 
     def lit(self, number: int) -> tuple[np.ndarray, Back]:
-        """As of a flat camera."""
+        """Image of a point (ny, nx), and the way back from weights of it."""
         some = [one.lit(number) for one in self.each]
         image = np.sum([weight * seen for weight, (seen, _) in zip(self.weights, some, strict=True)], axis=0)
         return image, partial(self._back, some)
 
     def along(self) -> np.ndarray:
-        """As of a flat camera."""
+        """Slopes along the pairs (n,), as of a flat camera."""
         return self._found + np.sum([one.along() for one in self.each], axis=0)
 
     def _back(self, some: list[tuple[np.ndarray, Back]], given: np.ndarray) -> None:
@@ -122,7 +122,7 @@ def weighed(moved: np.ndarray, seen: Sequence[np.ndarray]) -> np.ndarray:
 def by_parts(
     camera: HasOptics, pairs: Sequence[tuple[HasOptics, HasOptics]], accuracy: float
 ) -> PointImages | TiltedImages[PointImages]:
-    """Of instruments, a little to either side of one, whose model they have where theirs is "auto".
+    """Images by an instrument and pairs a little beside it, which have its model where theirs is "auto".
 
     Raises
     ------
@@ -156,7 +156,7 @@ def _flat(images: PointImages, points: Points, moved: Sequence[Moved]) -> PartPo
 def _leaning(
     camera: CameraOptics, pairs: Sequence[tuple[CameraOptics, CameraOptics]], accuracy: float
 ) -> TiltedImages[PointImages]:
-    """Of cameras of which one leans at least."""
+    """Images of points by cameras of which one leans at least."""
     for one in (camera, *(end for pair in pairs for end in pair)):
         require_paraxial(one)
     found = near(camera, [end for pair in pairs for end in pair], accuracy)

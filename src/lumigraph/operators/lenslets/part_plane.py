@@ -29,7 +29,7 @@ TOGETHER = 8
 
 @dataclass(frozen=True, eq=False)
 class PartPlane(CellPlane[SampledCamera, "CellImages"]):
-    """How a camera sees a plane, with derivatives by what differs between pairs of cameras.
+    """Images of a plane by a camera, with derivatives by what differs in pairs of cameras.
 
     The object's samples stay where they are, and as bright, before all cameras. Light from beyond the array
     is as of cells amid it, and what falls beside its cells is dark: images of the outermost lenslets are some
@@ -51,7 +51,7 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Of a raw image and of an object."""
+        """Shapes of a raw image and of an object."""
         return self.images.shape, self.grid.shape
 
     def _whole(self) -> SampledCamera:
@@ -99,7 +99,7 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
 
     @cached_property
     def _amid(self) -> PointImages:
-        """Of arrays around the points of one cell, as wide as their light is followed."""
+        """Images by arrays around the points of one cell, as wide as their light is followed."""
         camera, finer = self.images.camera, SPARE * self.images.accuracy
         optics = Optics.of(camera, camera.object_distance + self.dz, finer)
         # As even as the array: its cells' edges are where no rounding moves them by a cell.
@@ -112,7 +112,7 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
 
     @cached_property
     def _own(self) -> SampledCamera:
-        """Before points of a cell amid."""
+        """Camera before points of a cell amid."""
         middle = Points(np.array([[0.0, 0.0, self.dz]]), np.ones(1))
         camera, finer = self.images.camera, SPARE * self.images.accuracy
         beside = math.hypot(*Optics.of(camera, camera.object_distance + self.dz, finer).cells.size)
@@ -124,7 +124,7 @@ class PartPlane(CellPlane[SampledCamera, "CellImages"]):
 
     @cached_property
     def _here(self) -> SampledCamera:
-        """Of the whole array, sampled alike."""
+        """Camera with the whole array, sampled alike."""
         own = Optics.of(self.images.camera, self._own.optics.distance, self._own.optics.fineness.accuracy)
         amid = self._own.optics.cells
         cells = replace(own.cells, points=amid.points, samples=amid.samples)
@@ -253,7 +253,7 @@ def middle_of(own: SampledCamera) -> tuple[int, int]:
 
 
 def _amid(camera: CameraOptics, count: Sequence[int], accuracy: float, dz: float) -> CameraOptics:
-    """With so many cells, of which points at a depth are each as bright as a whole one."""
+    """Camera with so many cells, of which points at a depth are each as bright as a whole one."""
     assert camera.array is not None  # as `PartPlane` asks
     size = Optics.of(camera, camera.object_distance, accuracy).cells.size
     extent = count[0] * size[0], count[1] * size[1]

@@ -1,4 +1,4 @@
-r"""Single points before a camera: images, derivatives by place, and their slopes by the camera's numbers.
+r"""Single points before a camera: images, derivatives by place, and the way back to the camera's parts.
 
 A point that moves turns the wave in the main lens: with U = A P, as `point_images` has it, it changes by
 U_k = A(i f_k P), f_k a phase of first and second order there, and the image by 2 Re(U* U_k). Images and
@@ -127,7 +127,7 @@ STEPS = 1 / 256, 1 / 32
 
 
 class SteppedPoints(PartPoints):
-    """Before main lenses that change over the field, or are of glass: fields are compared between places.
+    """Points before main lenses that change over the field, or are of glass: fields of places are compared.
 
     Each point comes with six others beside it, a step to either side along each axis.
     """

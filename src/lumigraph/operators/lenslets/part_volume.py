@@ -11,7 +11,7 @@ from lumigraph.operators.lenslets.whole_planes import PlaneImages
 
 @dataclass(frozen=True, eq=False)
 class PartVolume:
-    """How an instrument sees planes through each other, with derivatives by what differs between pairs of it.
+    """Images of planes through each other, with derivatives by what differs in pairs of instruments.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class PartVolume:
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int, int]]:
-        """Of a raw image and of an object."""
+        """Shapes of a raw image and of an object."""
         raw, samples = self.planes[0].shape
         return raw, (len(self.planes), *samples)
 

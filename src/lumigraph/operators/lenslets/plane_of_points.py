@@ -32,7 +32,7 @@ EXACT = 8
 
 @dataclass(frozen=True, eq=False)
 class PlaneOfPoints(WholePlane):
-    """How a camera sees a plane, with derivatives by what differs between pairs of cameras.
+    """Images of a plane, point by point, with derivatives by what differs in pairs of cameras.
 
     The object's samples stay where they are, and as bright for their area, before all cameras.
 
@@ -62,7 +62,7 @@ class PlaneOfPoints(WholePlane):
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Of a raw image and of an object."""
+        """Shapes of a raw image and of an object."""
         return self.images.shape, self.grid.shape
 
     @property
@@ -132,7 +132,7 @@ class PlaneOfPoints(WholePlane):
 
 
 def plane_before(images: PointImages, grid: Grid, dz: float) -> WholePlane:
-    """Before cameras that see points as `images` have them: whole where images repeat, or by points."""
+    """Plane before cameras that see points as `images` do: whole where images repeat, or by points."""
     camera = images.camera
     if one_lens(camera) and camera.array is None and camera.model == "paraxial":
         return FilmPlane(images, grid, dz)
@@ -140,7 +140,7 @@ def plane_before(images: PointImages, grid: Grid, dz: float) -> WholePlane:
 
 
 def _repeats(camera: CameraOptics, accuracy: float) -> bool:
-    """Whether points of all cells of an array have the same images."""
+    """True if points of all cells of an array have the same images."""
     if not one_lens(camera) or camera.array is None or camera.array.scatter is not None:
         return False
     return camera.model != "exact" or not field_matters(camera, accuracy)

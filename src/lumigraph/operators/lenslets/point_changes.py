@@ -55,7 +55,7 @@ def point_changes(
 
 
 def has_changes(camera: CameraOptics) -> bool:
-    """Whether `place_changes` is of such a camera: paraxial, a thin lens for all fields before lenslets."""
+    """True if `place_changes` takes such a camera: paraxial, a thin lens for all fields before lenslets."""
     plain = camera.array is not None and camera.objects is None and camera.model == "paraxial"
     return plain and field_lenses.plate_of(camera) is None
 

@@ -63,7 +63,7 @@ class _Some:
 
 @dataclass(frozen=True, eq=False)
 class PointImages:
-    """How a camera sees points, with derivatives by what differs between pairs of cameras.
+    """Images of points by a camera, with derivatives by what differs in pairs of cameras.
 
     Points shine as samples of the camera's own object grid, as `simulate` has them. Objects that are made
     of the same points are seen in little more time than one.
@@ -155,11 +155,9 @@ class PointImages:
             found += gradient.along()
         return found + sum(read_anew(own, ends, light[n], one) for n, one in enumerate(weights))
 
-    def _some(
-        self, cameras: tuple[SampledCamera, list[Both]], given: Sequence[Any], x: np.ndarray
-    ) -> Iterator[_Some]:
-        """Those that shine, a few at a time, by depth."""
-        (own, ends), (points, where) = cameras, given
+    def _some(self, own: SampledCamera, given: Sequence[Any], x: np.ndarray) -> Iterator[_Some]:
+        """Points that shine, a few at a time, by depth."""
+        points, where = given
         order = np.argsort(points.positions[:, 2], kind="stable")
         order = order[x[:, order].any(0)]
         for k in range(0, len(order), TOGETHER):
@@ -292,5 +290,5 @@ def _require_as_thin(camera: CameraOptics, other: CameraOptics) -> None:
 
 
 def one_lens(camera: CameraOptics) -> bool:
-    """Whether points of all fields are seen through the same thin lens."""
+    """True if points of all fields are seen through the same thin lens."""
     return camera.objects is None and field_lenses.plate_of(camera) is None

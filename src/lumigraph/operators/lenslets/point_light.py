@@ -34,7 +34,7 @@ class PointLight(Protocol):
 def point_light(
     camera: CameraOptics, distance: float, widest: float, place: tuple[float, float] = (0.0, 0.0)
 ) -> PointLight:
-    """Of a point at a distance from the main lens [m], followed to `widest` from its image [m].
+    """Light of a point at a distance from the main lens [m], followed to `widest` from its image [m].
 
     Where the image is makes no difference, but to the exact model: at `place` in the lenslet plane [m].
     """
@@ -57,7 +57,7 @@ def _round(lens: Train) -> ThinLens | None:
 def paraxial_light(
     camera: CameraOptics, distance: float, widest: float, samples: int = PUPIL
 ) -> "RoundPupilLight | SampledPupilLight":
-    """As `point_light` of a paraxial camera; so many samples across the lens, at least."""
+    """Light of a point behind a paraxial lens, with derivatives; so many samples across it, at least."""
     lens = _cells.lens(camera)
     if (first := _round(lens)) is not None:
         half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation
@@ -68,9 +68,14 @@ def paraxial_light(
     return SampledPupilLight(camera, lens, distance, widest, samples)
 
 
+def by_distance(camera: CameraOptics, distance: float, rho: np.ndarray) -> np.ndarray:
+    """Slope of the phase at rho from a lens' middle [m] by the distance of the point [rad/m]."""
+    return -np.pi / camera.wavelength * (rho / distance) ** 2
+
+
 @dataclass(frozen=True, slots=True)
 class RoundPupilLight:
-    """Behind a round lens: a Hankel transform, the same in all directions.
+    """Light behind a round lens: a Hankel transform, the same in all directions.
 
     Parameters
     ----------
@@ -81,7 +86,7 @@ class RoundPupilLight:
     radial: CubicSpline
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """As `PointLight.at`."""
+        """Amplitude (y, x) in the lenslet plane, as of `PointLight.at`."""
         return self.radial(np.hypot(y[:, None], x))
 
 
@@ -100,7 +105,7 @@ def _radial(half: float, squared: float, focus: float, widest: float) -> CubicSp
 
 @dataclass(frozen=True, slots=True)
 class SampledPupilLight:
-    """Behind any lens: a matrix Fourier transform of its pupil.
+    """Light behind any lens: a matrix Fourier transform of its pupil.
 
     Parameters
     ----------
@@ -125,7 +130,7 @@ class SampledPupilLight:
     _pupil: list = field(default_factory=list, repr=False)
 
     def at(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """As `PointLight.at`."""
+        """Amplitude (y, x) in the lenslet plane, as of `PointLight.at`."""
         grid, pupil = self.behind()
         turn = -2j * np.pi / (self.camera.wavelength * self.camera.separation)
         return np.exp(turn * np.outer(y, grid.y)) @ (pupil @ np.exp(turn * np.outer(grid.x, x)))
@@ -147,3 +152,19 @@ class SampledPupilLight:
             light = np.vdot(pupil, pupil).real * squared**2 / np.prod(grid.pitch)
             self._pupil.extend((grid, pupil * np.sqrt(_cells.stop_area(self.lens) / light)))
         return self._pupil[0], self._pupil[1]
+
+    def changes(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Derivatives (3, y, x) of `at` by y, x and the point's distance."""
+        grid, pupil = self.behind()
+        turn = -2j * np.pi / (self.camera.wavelength * self.camera.separation)
+        down, across = np.exp(turn * np.outer(y, grid.y)), np.exp(turn * np.outer(grid.x, x))
+        right, left = pupil @ across, pupil @ (across * grid.x[:, None])
+        wide = pupil @ (across * grid.x[:, None] ** 2)
+        deeper = 1j * by_distance(self.camera, self.distance, np.ones(1))
+        bent = (down * grid.y**2) @ right + down @ wide
+        return np.stack([(turn * down * grid.y) @ right, turn * (down @ left), deeper * bent])
+
+    def turned(self, phase: np.ndarray) -> "SampledPupilLight":
+        """Change of the light with a factor of this phase (y, x) [rad] on the pupil's grid."""
+        grid, pupil = self.behind()
+        return replace(self, _pupil=[grid, 1j * phase * pupil])

@@ -1,7 +1,8 @@
 """Images of the points of a cell behind lenslets of any shape, from few of the points.
 
 A field is band-limited in the point's place too, so that those of some points give those of all. What is
-faint besides, as where lenslets are missing, follows from the intensities of fewer points still (`ChosenPoints`).
+faint besides, as where lenslets are missing, follows from the intensities of fewer points still
+(`ChosenPoints`).
 """
 
 import math
@@ -50,7 +51,7 @@ class PointSubset:
     staggered: bool = False
 
     def line(self, dy: int) -> Line:
-        """As `point_images.Apart.line`."""
+        """Blocks of the cells of one row, by their column, as of `BlockImages.line`."""
         y, x = (len(m) // len(c) for m, c in zip((self.down, self.across), self.cells, strict=True))
         parts, samples = self.fields.view(np.float32), self.fields.shape[2]
         down = self.down[(dy - self.cells[0].start) * y :][:y]
@@ -70,7 +71,7 @@ class PointSubset:
 def few(
     light: LensletLight, lenslets: Sequence[Row], cells: tuple[range, range], workers: int, *, staggered: bool
 ) -> PointSubset:
-    """For the points of some cells along y and x."""
+    """Images of the points of some cells along y and x, from those of few."""
     (rows, along_y), (columns, along_x) = map(_skeleton, light.axes, cells)
     samples = light.axes[0].samples * light.axes[1].samples
     fields = np.empty((len(rows), len(columns), samples), np.complex64)
@@ -121,7 +122,7 @@ class ChosenPoints:
     weights: np.ndarray
 
     def turned(self, shape: tuple[int, int], up: bool, left: bool) -> "ChosenPoints":
-        """In the mirrored cell of (y, x) points."""
+        """Chosen points of the mirrored cell of (y, x) points."""
         numbers = np.arange(len(self.weights)).reshape(shape)
         numbers = numbers[:: -1 if up else 1, :: -1 if left else 1].ravel()
         return ChosenPoints(numbers[self.numbers], mirrored(self.weights, shape, up, left))

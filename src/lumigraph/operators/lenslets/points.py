@@ -78,7 +78,7 @@ def image_and_error(camera: HasOptics, points: Points, accuracy: float) -> tuple
 
 
 def _within(optics: Optics, places: np.ndarray) -> np.ndarray:
-    """Which places (n, 2) lie in cells of the array."""
+    """True for places (n, 2) that lie in cells of the array."""
     cells = optics.cells
     low = np.array(cells.edge)
     return np.all((places >= low) & (places <= low + np.array(cells.size) * cells.count), axis=1)
@@ -101,7 +101,7 @@ TOLD = ((0.13, -0.21), (-0.38, 0.44))
 
 
 def seen(camera: CameraOptics, distance: float, accuracy: float) -> field_lenses.Image:
-    """Images of two points amid the array by lenses of a camera; see `varying`."""
+    """Images of two points amid the array by lenses of a camera; see `field_lenses`."""
     optics = Optics.of(camera, distance, max(accuracy, TELLING))
     lenslets, pitch = relay(optics), optics.array.lattice.pitch
     middle = np.array(optics.cells.middle(optics.cells.kind))

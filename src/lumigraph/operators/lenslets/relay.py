@@ -19,12 +19,12 @@ _KEPT = 8
 
 
 class Relay(Protocol):
-    """From amplitudes in the lenslet plane to amplitudes on the image, for any block of its cells."""
+    """Map from amplitudes in the lenslet plane to those on the image, for any block of its cells."""
 
     optics: Optics
 
     def places(self, rows: range, columns: range) -> tuple[np.ndarray, np.ndarray]:
-        """Where amplitudes are needed along y and along x [m], without the phase exp(iπw²/(λL))."""
+        """Places along y and along x where amplitudes are needed [m], without the phase exp(iπw²/(λL))."""
         ...
 
     def field(self, light: np.ndarray, rows: range, columns: range) -> np.ndarray:
@@ -39,7 +39,7 @@ def relay(optics: Optics) -> Relay:
 
 @dataclass(slots=True)
 class RelaySet:
-    """Of depths and accuracies, computed once; those whose cells and windows are alike share their matrices.
+    """Relays of depths and accuracies, computed once; those of like cells and windows share their matrices.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class RelaySet:
     _known: dict[tuple[float, float], Relay] = field(default_factory=dict)
 
     def of(self, camera: CameraOptics, dz: float, accuracy: float) -> Relay:
-        """Of one camera's plane at a depth [m]."""
+        """Relay of one camera's plane at a depth [m]."""
         if (key := (dz, accuracy)) not in self._known:
             optics = Optics.of(camera, camera.object_distance + dz, accuracy, self.blurred)
             if len(self._known) >= _KEPT and self.blurred is not None:

@@ -37,7 +37,7 @@ class SampleImages(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of a raw image and of an object."""
+        """Shapes of a raw image and of an object."""
         return self.sizes
 
     def _forward(self, intensity: Array) -> Array:
@@ -48,7 +48,7 @@ class SampleImages(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of the images [bytes]."""
+        """Memory of the images [bytes]."""
         return float(self.images.data.nbytes + self.images.indices.nbytes)
 
 
@@ -81,7 +81,7 @@ def sample_images(volume: PartVolume, depths: tuple[float, ...]) -> SampleImages
 
 
 def _images(volume: PartVolume) -> Iterator[csr_array]:
-    """Of some samples of a plane after the other."""
+    """Images of some samples of a plane after the other, sparse (samples, pixels)."""
     samples = volume.shape[1][1:]
     count = samples[0] * samples[1]
     for plane in volume.planes:
@@ -91,7 +91,7 @@ def _images(volume: PartVolume) -> Iterator[csr_array]:
 
 
 def _plain(array: Array) -> np.ndarray:
-    """On the CPU, where sparse matrices are; no gradient goes through them."""
+    """Array on the CPU, where sparse matrices are; no gradient goes through them."""
     if getattr(array, "requires_grad", False):
         raise GeometryError(
             "the object asks for gradients, which do not go through images of samples. Use operator.adjoint."

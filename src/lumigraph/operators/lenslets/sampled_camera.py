@@ -228,7 +228,7 @@ class SampledCamera:
         return (turn * (y - place[0]), grid.y), (turn * (x - place[1]), grid.x)
 
     def moves(self, source: SourcePoint) -> list[Phase]:
-        """Phases in the main lens as a point moves by y, x and dz, one along y plus one along x [rad/m].
+        """Slopes of the lens' phase by a point's y, x and dz, sums of one along y and one along x [rad/m].
 
         How much light a sample of the object stands for, by its depth, stays as it is.
         """
@@ -256,7 +256,7 @@ class SampledCamera:
 
     @cached_property
     def _varies(self) -> bool:
-        """Whether the main lens changes over the field."""
+        """True if the main lens changes over the field."""
         return field_lenses.plate_of(self.optics.camera) is not None
 
     @cached_property

@@ -6,9 +6,8 @@ In lengths of a lenslet's pitch p, with ω on the lenslet and σ from its middle
           e^{i \pi a (\sigma - \omega)^2} \, d\omega,
           \quad a = \frac{p^2}{\lambda b}, \quad c = \frac{p^2}{\lambda f}
 
-with the telecentric distance b, by Gauss-Legendre quadrature between its edges. Nodes, samples and the
-light's own samples are frozen in pitches, so that a camera's numbers are a and c alone, and the nodes where
-fill factors differ.
+with the telecentric distance b, by Gauss-Legendre quadrature between its edges. Nodes and samples are frozen
+in pitches: a camera's numbers are a and c alone, and where fill factors differ the nodes.
 """
 
 import math
@@ -186,7 +185,7 @@ class SquareLenslets:
         return [(name, which) for name in ("strength", "focus", "nodes", "weights", "light", *more)]
 
     def _given(self, key: Key) -> tuple[Any, ...]:
-        """What a number follows from, beside the sampling that all share."""
+        """Values that a number follows from, beside the sampling that all share."""
         array, size = self.optics.array, self.optics.cells.size
         if key[0] in ("nodes", "weights", "light"):
             return (array.fill_factor, *np.divide(self._aside(*key[2:]), size).tolist())
@@ -223,7 +222,7 @@ class SquareLenslets:
         return legendre(aside - half, aside + half, self._counts[which])
 
     def _aside(self, *one: int) -> tuple[float, float]:
-        """From the lattice to the middle of a lenslet [m]."""
+        """Offset (y, x) of the middle of a lenslet from the lattice [m]."""
         return 0.0, 0.0
 
     @cached_property

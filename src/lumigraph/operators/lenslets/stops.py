@@ -46,7 +46,7 @@ class StopEllipse:
 
     @property
     def area(self) -> float:
-        """Over the round stop's."""
+        """Area of the ellipse over the round stop's."""
         return self.along * self.across / self.round**2
 
     def transform(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -59,7 +59,7 @@ class StopEllipse:
 
 
 def disc_of(radius: float) -> Transform:
-    """Of a round stop's image [m]."""
+    """Fourier transform of a round stop's image of a radius [m], 1 in the middle."""
 
     def transform(y: np.ndarray, x: np.ndarray) -> np.ndarray:
         turns = 2 * np.pi * radius * np.hypot(y[:, None], x)
@@ -91,7 +91,7 @@ class Stops:
 
 
 def of(optics: Optics) -> Stops:
-    """Of a camera's cells; those of a lens of glass before pixels that respond to angles are round."""
+    """Stops of a camera's cells; those of a lens of glass before pixels that respond to angles are round."""
     camera = optics.camera
     plate = field_lenses.plate_of(camera)
     if plate is None or plate.openings is None or _cells.accepted(camera) is not None:
@@ -127,7 +127,7 @@ def _places(optics: Optics) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True, slots=True)
 class _StopView:
-    """What places of the lenslets see of a stop so far away, whose image has such a half width if round."""
+    """A stop so far away, as places of the lenslets see it; `round`, its image's half width if round."""
 
     openings: VignettedPupil
     wavelength: float
@@ -135,7 +135,7 @@ class _StopView:
     round: float
 
     def at(self, y: float, x: float) -> StopEllipse:
-        """From a place [m]; objects are seen there whose images lie on the other side of the axis."""
+        """Stop seen from a place [m], where objects appear whose images lie on the other side of the axis."""
         field = math.hypot(y, x) / self.separation
         along, across = self.openings.at(field, self.wavelength)
         middle = self.openings.middle(field) * self.round
@@ -143,7 +143,7 @@ class _StopView:
 
 
 def _left(ellipses: tuple[StopEllipse, ...], tried: list[StopEllipse], count: int, radius: float) -> float:
-    """How far off stops between others are, relative rms, at the worst of those tried."""
+    """Relative rms error of stops between others, at the worst of those tried."""
     worst = 0.0
     for (y, x), one in zip(field_lenses.TRIED, tried, strict=True):
         down, across = (field_lenses.lagrange(count, np.array([at]))[:, 0] for at in (y, x))

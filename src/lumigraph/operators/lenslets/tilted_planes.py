@@ -89,7 +89,7 @@ class FlatCameras:
 
 @dataclass(frozen=True, slots=True)
 class _DistanceRange:
-    """Of one distance over the pixels: its middle, and half of how far it goes [m]."""
+    """Range of one distance over the pixels: its middle, and half of how far it goes [m]."""
 
     middle: float
     half: float
@@ -100,11 +100,11 @@ class _DistanceRange:
         return cls((low + high) / 2, (high - low) / 2)
 
     def nodes(self, count: int) -> list[float]:
-        """So many; the middle alone where nothing changes."""
+        """Nodes, so many [m]; the middle alone where nothing changes."""
         return (self.middle + self.half * nodes(count)).tolist() if self.half else [self.middle]
 
     def shares(self, count: int, values: np.ndarray) -> np.ndarray:
-        """Of the nodes (n, ...) in values."""
+        """Shares of the nodes (n, ...) in values."""
         if not self.half:
             return np.ones((1, *values.shape))
         return lagrange(count, ((values - self.middle) / self.half).ravel()).reshape(count, *values.shape)
@@ -112,7 +112,7 @@ class _DistanceRange:
 
 @dataclass(frozen=True, slots=True)
 class TiltDistances:
-    """At which flat cameras stand for one that leans: of array and sensor.
+    """Distances of array and sensor at which flat cameras stand for one that leans.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class TiltDistances:
     left: float
 
     def of(self, camera: CameraOptics) -> FlatCameras:
-        """Of a camera that leans like those that they were chosen for, or hardly more."""
+        """Flat cameras for one that leans like those that the distances were chosen for, or hardly more."""
         values, both = shifts(camera), list(zip(self.ranges, self.counts, strict=True))
         array, sensor = (one.nodes(n) for one, n in both)
         cameras = tuple(moved(camera, a, s) for a in array for s in sensor)
@@ -153,7 +153,7 @@ def moved(camera: CameraOptics, array: float, sensor: float) -> CameraOptics:
 
 
 def shifts(camera: CameraOptics) -> tuple[np.ndarray, np.ndarray]:
-    """How much farther lenslets before pixels, and these, stand from the main lens: two (ny, nx) [m]."""
+    """Extra distances of lenslets before pixels, and of these, from the main lens: two (ny, nx) [m]."""
     lean, array, pixels = camera.lean or TiltAndBow(), camera.array, camera.sensor.grid
     assert array is not None  # asked by those who call
     y, x = np.meshgrid(-pixels.y, -pixels.x, indexing="ij")  # raw images are turned by 180°
@@ -201,7 +201,7 @@ def distances(camera: CameraOptics, accuracy: float) -> TiltDistances:
 
 
 def near(camera: CameraOptics, others: Sequence[CameraOptics], accuracy: float) -> TiltDistances:
-    """For a camera and others that lean a little more or less, or of which only these lean.
+    """Distances for a camera and others that lean a little more or less, or of which only these lean.
 
     What differs between them is followed by three distances at least, which are not too close to be told
     apart.
@@ -223,7 +223,7 @@ def _pitch(camera: CameraOptics) -> float:
 
 
 def _beside(camera: CameraOptics) -> float:
-    """Of lenslets taken as far away as their neighbours: relative rms, at the steepest place."""
+    """Error of lenslets taken as far away as their neighbours: relative rms, at the steepest place."""
     lean, array, b = camera.lean, camera.array, lenslet_distance(camera)
     assert lean is not None  # asked by those who call
     assert array is not None
@@ -289,14 +289,14 @@ class TiltedOperator(Sum):
 
     @property
     def error(self) -> float:
-        """Of the operators, and of distances between theirs."""
+        """Relative rms error of the operators, and of distances between theirs."""
         return math.hypot(max(part.error for part in self.maps), self.left)
 
 
 def leaning_operator(
     camera: CameraOptics, accuracy: float, of: Callable[[CameraOptics, int, int], Linear]
 ) -> TiltedOperator:
-    """Of operators `of` a flat camera, its number and how many there are."""
+    """Operator of a camera that leans, from those `of` a flat camera, its number and how many there are."""
     found = flat(camera, accuracy)
     count = len(found.cameras)
     parts = [of(one, number, count) for number, one in enumerate(found.cameras)]

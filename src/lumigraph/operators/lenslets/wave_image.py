@@ -55,7 +55,7 @@ class Side:
 
     @classmethod
     def of(cls, optics: Optics, which: int, pitches: float) -> "Side":
-        """With light followed for so many pitches."""
+        """Axis of an array, with light followed for so many pitches."""
         cells, array, pitch = optics.cells, optics.array, optics.array.lattice.pitch
         size, count, reach = cells.size[which], cells.image[which], pitches * pitch
         axis = replace(optics.axes[which], neighbourhood=reach, band=0.0)
@@ -74,7 +74,7 @@ class Side:
 
     @property
     def step(self) -> float:
-        """Between samples [m]."""
+        """Distance between samples [m]."""
         return self.axis.size / self.axis.samples
 
     @property
@@ -89,11 +89,11 @@ class Side:
         return count if self.endless else _fast(count + self.reach)
 
     def number(self, place: np.ndarray) -> np.ndarray:
-        """Of the samples at or before some lenslets."""
+        """Numbers of the samples at or before some lenslets."""
         return np.floor((place - self.first) / self.step - 0.5 + 1e-4).astype(int)
 
     def offsets(self) -> np.ndarray:
-        """From a lenslet to the samples around it [m]."""
+        """Offsets from a lenslet to the samples around it [m]."""
         place = (self.origin - self.first) / self.step - 0.5
         return (np.arange(-self.reach, self.reach + 1) - (place - math.floor(place + 1e-4))) * self.step
 
@@ -108,12 +108,12 @@ class Side:
 
 
 def _fast(count: int) -> int:
-    """So many or a few more, which transforms are fast for."""
+    """Length, so many or a few more, for which transforms are fast."""
     return int(fft.next_fast_len(count) or count)
 
 
 def _samples(optics: Optics, which: int, farthest: float) -> int:
-    """Along a cell, for fringes of light from `farthest` apart [m]; lenslets stand whole samples apart."""
+    """Samples along a cell, for fringes of light `farthest` apart [m]; lenslets stand whole samples apart."""
     axis, lattice = optics.axes[which], optics.array.lattice
     squared = optics.camera.wavelength * _cells.telecentric_distance(optics.camera)
     least = max(axis.samples, farthest * axis.size / squared)
@@ -123,7 +123,7 @@ def _samples(optics: Optics, which: int, farthest: float) -> int:
 
 @dataclass(frozen=True)
 class WaveImage:
-    """Of a wave of amplitude 1; what pixels make of its angles is theirs of light that leans by `tilt`."""
+    """Image of a wave of amplitude 1, to whose angles pixels respond as to light that leans by `tilt`."""
 
     optics: Optics
     sides: tuple[Side, Side]
@@ -131,11 +131,11 @@ class WaveImage:
 
     @classmethod
     def of(cls, optics: Optics, pitches: float) -> "WaveImage":
-        """With light followed for so many pitches."""
+        """Image of a wave whose light is followed for so many pitches."""
         return cls(optics, (Side.of(optics, 0, pitches), Side.of(optics, 1, pitches)))
 
     def amplitude(self) -> np.ndarray:
-        """On the cells of the shorter array (cells, samples, cells, samples)."""
+        """Amplitude on the cells of the shorter array (cells, samples, cells, samples)."""
         (y, x), total = self.sides, 0.0
         for number, focal_length in enumerate(focal_lengths(self.optics.array)):
             places = np.zeros((y.length, x.length), np.complex64)
@@ -166,12 +166,12 @@ class WaveImage:
 
     @property
     def farthest(self) -> float:
-        """Where half of the light has faded out [m]."""
+        """Distance at which half of the light has faded out [m]."""
         return self.sides[0].axis.neighbourhood * (1 - FADING / 2)
 
     @property
     def samples(self) -> int:
-        """Of the wave's image, or of a lenslet's where that is larger, all in all."""
+        """Number of samples of the wave's image, or of a lenslet's where that is larger, all in all."""
         return math.prod(max(side.length, 2 * side.reach + 1) for side in self.sides)
 
     @property
@@ -188,7 +188,7 @@ class WaveImage:
         return float(2 * weight @ chords)
 
     def _places(self, kind: int) -> np.ndarray:
-        """Of the lenslets of a kind (n, 2) [m]."""
+        """Places of the lenslets of a kind (n, 2) [m]."""
         lattice, kinds = self.optics.array.lattice, len(focal_lengths(self.optics.array))
         pairs = lattice.indices(self.sides[0].limits, self.sides[1].limits)
         return lattice.position(pairs[lattice.kind(pairs[:, 0], pairs[:, 1]) % kinds == kind])

@@ -25,11 +25,11 @@ from lumigraph.operators.lenslets.gradient import times
 
 
 class PlaneImages(Protocol):
-    """What sees points, or a plane (y, x), with derivatives by what differs between pairs of instruments."""
+    """Images of points, or of a plane (y, x), with derivatives by what differs in pairs of instruments."""
 
     @property
     def shape(self) -> Any:
-        """Of a raw image first, or alone."""
+        """Shape of a raw image first, or alone."""
         ...
 
     def forward(self, x: Any, /) -> np.ndarray:
@@ -37,7 +37,7 @@ class PlaneImages(Protocol):
         ...
 
     def derivative(self, x: Any, change: np.ndarray, /) -> np.ndarray:
-        """Its change."""
+        """Change of the raw image along a change of the pairs (n,)."""
         ...
 
     def gradient(self, x: Any, weights: np.ndarray, /) -> np.ndarray:
@@ -46,7 +46,7 @@ class PlaneImages(Protocol):
 
 
 class WholePlane(ABC):
-    """How an instrument sees a plane, with derivatives by what differs between pairs of instruments.
+    """Images of a plane by an instrument, with derivatives by what differs in pairs of instruments.
 
     The object's samples stay where they are, and as bright, before all of them.
     """
@@ -56,7 +56,7 @@ class WholePlane(ABC):
     @property
     @abstractmethod
     def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Of a raw image and of an object."""
+        """Shapes of a raw image and of an object."""
 
     @property
     @abstractmethod
@@ -128,7 +128,7 @@ class RepeatedImages:
     first: tuple[int, int]
 
     def add(self, light: np.ndarray, points: np.ndarray) -> None:
-        """What points (rows, columns, points) bring, to cells (rows, columns, samples) of the image."""
+        """Add the light of points (rows, columns, points) to cells (rows, columns, samples) of the image."""
         flat = light.reshape(-1, light.shape[-1])
         for offset in np.ndindex(*self.kernel.shape[:2]):
             flat += self._shining(points, offset, light.shape) @ self.kernel[offset]
@@ -150,7 +150,7 @@ class RepeatedImages:
         return found
 
     def _from(self, offset: tuple[int, ...], shape: tuple[int, ...]) -> tuple[slice, slice]:
-        """Where the points are whose light falls into the image's cells so many away."""
+        """Slices of the points whose light falls into the image's cells so many away."""
         starts = [first - k for first, k in zip(self.first, offset, strict=True)]
         y, x = (slice(start, start + n) for start, n in zip(starts, shape[:2], strict=True))
         return y, x
@@ -169,7 +169,7 @@ class RepeatedKernel(Protocol):
     """Images of points that repeat themselves; see `RepeatedImages`."""
 
     def add(self, light: np.ndarray, points: np.ndarray, /) -> None:
-        """What points bring to the light."""
+        """Add the light of points to that on the image."""
         ...
 
     def return_to(self, points: np.ndarray, seen: np.ndarray, /) -> None:
@@ -189,7 +189,7 @@ class PlaneGradient(Protocol[Given]):
     """Slopes of a number by what images of a cell's points follow from."""
 
     def add(self, block: Given, asked: np.ndarray) -> None:
-        """Those that come from slopes by a block's kernel."""
+        """Add the slopes that come from slopes by a block's kernel."""
         ...
 
     def along(self) -> np.ndarray:
@@ -198,7 +198,7 @@ class PlaneGradient(Protocol[Given]):
 
 
 class CellPlane(WholePlane, Generic[End, Some]):
-    """Of an instrument whose images repeat themselves from cell to cell."""
+    """Images of a plane by an instrument whose images repeat themselves from cell to cell."""
 
     @abstractmethod
     def _whole(self) -> End:
@@ -206,7 +206,7 @@ class CellPlane(WholePlane, Generic[End, Some]):
 
     @abstractmethod
     def _pairs(self) -> Sequence[tuple[End, End]]:
-        """Those a little to either side."""
+        """Pairs of instruments a little to either side."""
 
     @abstractmethod
     def _points(self, end: End, x: np.ndarray) -> np.ndarray:
@@ -226,11 +226,11 @@ class CellPlane(WholePlane, Generic[End, Some]):
 
     @abstractmethod
     def _read(self, end: End) -> Linear:
-        """What pixels take of the samples."""
+        """Map from the samples of the image to the pixels."""
 
     @abstractmethod
     def _blocks(self) -> Iterator[Some]:
-        """Of all points of a cell."""
+        """Blocks of the images of all points of a cell."""
 
     @abstractmethod
     def _changed(self, change: list[float]) -> Callable[[Some], RepeatedKernel]:
@@ -238,7 +238,7 @@ class CellPlane(WholePlane, Generic[End, Some]):
 
     @abstractmethod
     def _slopes(self) -> PlaneGradient[Some]:
-        """Of a number that does not change yet."""
+        """Slopes of a number that does not change yet."""
 
     @property
     def _count(self) -> int:

@@ -187,7 +187,7 @@ def faded(cells: int, fine: int) -> np.ndarray:
 
 
 class LensletBench:
-    """The lenslets around a point's own, and the way from there to the pixels; see `Crossed`."""
+    """The lenslets around a point's own, and the way from there to the pixels; see `SeparableLenslets`."""
 
     def __init__(
         self, objective: Objective, lenslet: Lenslet, sampling: CellSampling, reach: int, margin: float,
@@ -321,8 +321,8 @@ def sampled(spectrum: np.ndarray, fine: int, sampling: CellSampling) -> tuple[np
 
 
 def responses(count: int, fine: int, sampling: CellSampling) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Along an axis of `count` samples, `fine` to a lenslet: factors of samples, and the parts of amplitudes
-    that pixels average and that samples hold, the latter squared.
+    """Factors of samples along an axis of `count`, `fine` to a lenslet, and the parts of amplitudes that
+    pixels average and that samples hold, the latter squared.
     """
     f = np.fft.fftfreq(count) * fine  # in periods of a pitch
     averaged = np.sinc(f * sampling.width)

@@ -45,7 +45,7 @@ class CellSampling:
         Of a pixel, a square over which light is averaged, over the lenslet's pitch.
     degree
         0 where the samples are pixels; else that of the B-splines whose coefficients they are, from which
-        pixels anywhere are interpolated (`microscope_pixels`).
+        pixels anywhere are interpolated (`pixels`).
     light
         What a pixel reads of even light of 1: the square of its fill factor.
     """

@@ -66,7 +66,7 @@ class Multislice:
 
     @cached_property
     def bent(self) -> float:
-        """How much slices change n sin θ."""
+        """Change of n sin θ by the slices."""
         n, aperture = self.objective.medium, self.objective.aperture
         return self.medium.bent(self.objective.wavelength, aperture / math.sqrt(n * n - aperture**2))
 
@@ -98,7 +98,7 @@ class Multislice:
         return Grid((count, count), (pitch, pitch))
 
     def factor(self, y: float, x: float, qy: np.ndarray, qx: np.ndarray) -> np.ndarray:
-        """What slices multiply the pupil's amplitudes at (qy, qx) by, of a point at (y, x) [m]."""
+        """Factors of the pupil's amplitudes at (qy, qx) by the slices, of a point at (y, x) [m]."""
         known = self._plain_waves
         if known.get("qx") is not qx:
             known.update(qx=qx, waves=self._waves(np.fft.fftshift(arrays.ifft2(self._plain)), qy, qx))
@@ -120,7 +120,7 @@ class Multislice:
         return np.fft.fftshift(seen)
 
     def _step(self, away: float) -> np.ndarray:
-        """What a distance [m] does to plane waves; slices are often as far apart, so the last is kept."""
+        """Factors of plane waves over a distance [m]; slices are often as far apart, so the last are kept."""
         key = round(away * 1e12)
         if key not in self._steps:
             if len(self._steps) >= STEPS:

@@ -6,7 +6,7 @@ the pupil's phase φ:
 
 .. math:: dU = B_y (i \varphi P) B_x, \quad d|U|^2 = 2 \mathrm{Re}(U^* dU)
 
-Before round lenslets b are plane waves (`microscope_round`). A point's place changes the phase, too. See
+Before round lenslets b are plane waves (`round_lenslets`). A point's place changes the phase, too. See
 docs/theory/microscope.md.
 """
 

@@ -21,7 +21,7 @@ Pieces = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellOptics:
-    """What an objective and the lenslets behind it do to light of a cell's points.
+    """Objective and the lenslets behind it, as light of a cell's points goes through them.
 
     Parameters
     ----------
@@ -42,13 +42,13 @@ class CellOptics:
 
     @classmethod
     def of(cls, images: PupilImages, which: int, dz: float) -> "CellOptics":
-        """Of a microscope."""
+        """Objective of a microscope, by its number, for points at a depth [m]."""
         told, waves = images.sampled(images.objectives[which], dz)
         return cls(images, which, dz, told, waves, _pieces(images, which, told))
 
     @property
     def field_numbers(self) -> int:
-        """Of a point's field."""
+        """Number of values of a point's field."""
         return len(self.pieces[0]) * self.waves.down.shape[0] ** 2
 
     def parts(self, pairs: Sequence[Both]) -> WindowParts:
@@ -64,14 +64,14 @@ class CellOptics:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellChange:
-    """Of what images of a cell's points follow from: of pieces, and of the matrices that change."""
+    """Change of what images of a cell's points follow from: of pieces, and of the matrices that change."""
 
     pieces: Pieces
     matrices: dict[int, np.ndarray]
 
     @classmethod
     def of(cls, behind: CellOptics, change: list[float], pairs: Sequence[Both]) -> "CellChange":
-        """So many times from the first to the last of each pair."""
+        """Change of so many times each pair, from its first to its last."""
         parts, matrices = behind.parts(pairs), dict[int, np.ndarray]()
         pieces = [np.zeros(one.shape, np.result_type(one, np.float64)) for one in behind.pieces]
         for weight, pair in zip(change, pairs, strict=True):
@@ -110,7 +110,7 @@ class PupilColumn:
 
     @classmethod
     def of(cls, behind: CellOptics, at: float) -> "PupilColumn":
-        """At x [cells]."""
+        """Column of the points at x [cells]."""
         (pupil, phases, size), waves = behind.pieces, behind.waves
         turn = np.exp(1j * (at * float(size) * phases[1] + behind.dz * phases[2]))
         wave = pupil * turn
@@ -156,7 +156,7 @@ class ColumnImages(RepeatedImages):
 
     @classmethod
     def of(cls, columns: list[PupilColumn], places: np.ndarray, numbers: slice, reach: int) -> "ColumnImages":
-        """At places [cells], of these numbers, whose light goes so many cells to each side."""
+        """Images of the points of these numbers at places [cells], whose light goes `reach` cells around."""
         turns = [one.turned(places) for one in columns]
         before = [
             one.behind.waves.down.down(turn[:, None, :, None] * one.right)
@@ -199,14 +199,14 @@ class ColumnImages(RepeatedImages):
         return found
 
     def of_each(self, kernel: np.ndarray) -> Iterator[np.ndarray]:
-        """What a kernel has of the points' windows (m, count, count), behind each objective."""
+        """Windows (m, count, count) of the points in a kernel, behind each objective."""
         for one in self.columns:
             cells, N = one.behind.told[0], self._samples
             tiles = kernel[self._inside(cells)].reshape(cells, cells, -1, N, N).transpose(2, 0, 3, 1, 4)
             yield tiles.reshape(-1, cells * N, cells * N)
 
     def _with(self, images: Sequence[np.ndarray]) -> "ColumnImages":
-        """With other windows (m, count, count) behind each objective."""
+        """Images with other windows (m, count, count) behind each objective."""
         kernel, N = np.zeros_like(self.kernel), self._samples
         for one, image in zip(self.columns, images, strict=True):
             cells = one.behind.told[0]
@@ -216,18 +216,18 @@ class ColumnImages(RepeatedImages):
 
     @property
     def _samples(self) -> int:
-        """Along a cell."""
+        """Number of samples along a cell."""
         return self.columns[0].behind.images.layout.sampling.pixels
 
     def _inside(self, cells: int) -> tuple[slice, slice]:
-        """Where a window of so many cells stands in the kernel."""
+        """Slices of the kernel in which a window of so many cells stands."""
         first = (len(self.kernel) - cells) // 2
         return slice(first, first + cells), slice(first, first + cells)
 
 
 @dataclass(eq=False)
 class ColumnGradient:
-    """What a number changes by as what images of a cell's points, behind one objective, follow from.
+    """Gradient of a number by what images of a cell's points, behind one objective, follow from.
 
     Without conjugates: what changes is Re of products with changes.
     """
@@ -242,7 +242,7 @@ class ColumnGradient:
         self.by = [np.zeros(one.shape, np.result_type(one, np.float64)) for one in self.behind.pieces]
 
     def add(self, lit: ColumnImages, k: int, given: np.ndarray) -> None:
-        """Those by samples (m, count, count) behind the objective, of light of 1."""
+        """Add the slopes that follow from those by samples (m, count, count), of light of 1."""
         column, turn, fields, parts = lit.columns[k], lit.turns[k], lit.fields[k], self.parts
         if column is not self._column:
             self.leave()
@@ -280,7 +280,7 @@ class ColumnGradient:
         self._column = None
 
     def along(self, pair: Both) -> float:
-        """From one microscope to another close by."""
+        """Change of the number from one microscope to another close by."""
         self.leave()
         found = self.parts.along(pair, self.behind.images)
         return found + sum(times(by, *ends) for by, ends in zip(self.by, self.behind.ends(pair), strict=True))
@@ -293,5 +293,5 @@ def _pieces(images: PupilImages, which: int, told: Sampled) -> Pieces:
 
 
 def _light(fields: np.ndarray) -> np.ndarray:
-    """On the fine grid (m, n, n), of fields (m, modes, n, n)."""
+    """Light on the fine grid (m, n, n), of fields (m, modes, n, n)."""
     return np.square(np.abs(fields)).sum(1)

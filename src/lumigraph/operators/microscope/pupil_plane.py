@@ -35,7 +35,7 @@ from lumigraph.operators.sampling.resampling import represented
 
 @dataclass(frozen=True, eq=False)
 class PupilPlane(CellPlane[PupilImages, ColumnImages]):
-    """How a microscope sees a plane, with derivatives by what differs between pairs of microscopes.
+    """Images of a plane by a microscope, with derivatives by what differs in pairs of microscopes.
 
     The object's samples stay where they are, along the lenslets' rows and columns, and as bright, before all
     microscopes. Light from beyond the lenslets that are seen comes in; what goes beyond a point's window, a
@@ -69,7 +69,7 @@ class PupilPlane(CellPlane[PupilImages, ColumnImages]):
 
     @property
     def shape(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Of a raw image and of an object."""
+        """Shapes of a raw image and of an object."""
         return self.images.shape, self.grid.shape
 
     def _whole(self) -> PupilImages:

@@ -50,7 +50,7 @@ class MicroscopePoints:
     points: Points
 
     def light(self, number: int) -> float:
-        """Of a point's samples."""
+        """Light of a point's samples."""
         return self.images.unit * float(self.points.intensities[number])
 
     def pupil(self, which: int, nodes: int) -> np.ndarray:
@@ -58,7 +58,7 @@ class MicroscopePoints:
         return self.images.pupil(self.images.objectives[which], nodes)
 
     def phases(self, which: int, nodes: int) -> np.ndarray:
-        """By a point's y, x and dz (3, rows, nodes) [rad/m]."""
+        """Slopes of the phase by a point's y, x and dz (3, rows, nodes) [rad/m]."""
         return self.images.phases(self.images.objectives[which], nodes)
 
     def wave(self, which: int, nodes: int, number: int, cell: tuple[int, int]) -> np.ndarray:
@@ -70,7 +70,7 @@ class MicroscopePoints:
 
 @dataclass(eq=False)
 class WindowParts:
-    """What images of a window are products of behind an objective, and slopes by it.
+    """Matrices whose products are the images of a window behind an objective, and slopes by them.
 
     Parameters
     ----------
@@ -94,11 +94,11 @@ class WindowParts:
         self.by += [np.zeros_like(m) for m in (w.window.lenslets, w.window.path)] if w.window else []
 
     def along(self, ends: Both, own: PupilImages) -> float:
-        """What a number changes by from one microscope to another close by, as the matrices do."""
+        """Change of a number from one microscope to another close by, as the matrices change."""
         return sum(times(self.by[k], *pair) for k, pair in self.ends(ends, own).items())
 
     def ends(self, ends: Both, own: PupilImages) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """Those that differ between two microscopes, by number: B_y 0, B_x 1, S 2; T 3 and 4."""
+        """Matrices that differ between two microscopes, by number: B_y 0, B_x 1, S 2; T 3 and 4."""
         found, (low, high) = {}, ends
         if self._behind(low) != self._behind(high):
             both = zip(*(self._made(self._behind(one), self._behind(own)) for one in ends), strict=True)
@@ -129,12 +129,12 @@ class WindowParts:
 
     @property
     def _exact(self) -> Told:
-        """As sampled, in double precision."""
+        """Sampling of the window, in double precision."""
         cells, fine, nodes, _ = self.told
         return cells, fine, nodes, "complex128"
 
     def _behind(self, images: PupilImages) -> Place:
-        """What waves behind lenslets follow from."""
+        """Values that waves behind lenslets follow from."""
         return replace(images.objectives[self.which], aberrations=()), images.lenslet
 
 
@@ -163,7 +163,7 @@ class _PointPath:
 
     @property
     def light(self) -> np.ndarray:
-        """On the fine grid, and its derivatives (4, n, n)."""
+        """Light on the fine grid, and its derivatives (4, n, n)."""
         light = np.real(self.fields[0].conj() * self.fields).sum(1)
         light[1:] *= 2
         return light
@@ -287,7 +287,7 @@ def _between(
     cell: tuple[int, int],
     by: tuple[np.ndarray, np.ndarray],
 ) -> float:
-    """What a point's wave, and how it turns, change by between two microscopes."""
+    """Change of a number by a point's wave, and by how it turns, between two microscopes."""
     which, nodes = parts.which, parts.told[2]
     low, high = (one.images.within(one.points.positions[number], cell) for one in pair)
     first, last = (one.images.objectives[which] for one in pair)
@@ -298,7 +298,7 @@ def _between(
 
 
 def _placed_anew(ends: tuple[PupilImages, PupilImages], whole: np.ndarray, given: np.ndarray) -> float:
-    """What weighed pixels change by as where they stand does."""
+    """Change of weighed pixels by where they stand, between two microscopes."""
     low, high = ends
     if low.layout.placement is high.layout.placement:
         return 0.0

@@ -5,7 +5,7 @@ r"""A microscope's operator between spectra over its lenslets: each frequency ha
 
 for parts c of the points and q of the pixels that are even or odd over a cell; tr is the cosine where their
 parities along an axis agree, else the sine (docs/theory/microscope.md). Few patterns of them are followed
-(`microscope_patterns`), in tiles of large arrays (`microscope_tiles`).
+(`patterns`), in tiles of large arrays (`tiles`).
 """
 
 import itertools

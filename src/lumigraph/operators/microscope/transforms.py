@@ -1,7 +1,7 @@
 r"""Transforms over lenslets, as products with cosines and sines.
 
 At ±f_y and ±f_x the parts of cells make four real sums, by cosine or sine along either axis. The matrices of
-the frequencies (`microscope_spectrum`) are the same for all four, if even parts are summed by (cos, sin) and
+the frequencies (`spectrum`) are the same for all four, if even parts are summed by (cos, sin) and
 odd ones by (-sin, cos) along that axis: real and imaginary parts of the transform, but for a rotation that
 all of them share. Products take less time than a fast transform of such lengths, and whatever is written
 between them is real.

@@ -3,8 +3,8 @@
 With s × s points in each lenslet's cell and N × N samples of the image, a plane's raw image is the sum over
 the offsets between the points' cell and the image's of (cells × s²) · (s² × N²). All offsets of a depth are
 one product: the points of the neighbouring cells are gathered first. Where it takes less time, all of it goes
-through the lenslets' frequencies instead (`microscope_spectrum`), with the same result to rounding and to
-`left_out`. What goes far is added by a few patterns (`microscope_far`).
+through the lenslets' frequencies instead (`spectrum`), with the same result to rounding and to
+`left_out`. What goes far is added by a few patterns (`far_light`).
 """
 
 import math
@@ -50,11 +50,11 @@ class MicroscopeOperator(Linear):
         Lenslets that the object reaches beyond those on each side; below 0 where they reach beyond it, as
         pixels at the border see some of their light.
     by_frequency
-        Whether `forward` and `adjoint` go through the lenslets' frequencies (`microscope_spectrum`), where
+        Whether `forward` and `adjoint` go through the lenslets' frequencies (`spectrum`), where
         rounding may leave -1e-6 of the highest value instead of 0; else by products over all offsets.
     left_out
         Relative rms of a point's image that fewer patterns of the points may leave out there, those of the
-        pixels what is left (`microscope_patterns.pixel_patterns`); 0 for all patterns.
+        pixels what is left (`patterns.pixel_patterns`); 0 for all patterns.
     """
 
     kernels: tuple[SliceKernel, ...]

@@ -70,7 +70,7 @@ def over_cells(waves: np.ndarray, turns: np.ndarray, cells: int) -> np.ndarray:
 
 
 class SeparableLenslets:
-    """Square lenslets around a point's own, and the way from there to the pixels; as `Bench`.
+    """Square lenslets around a point's own, and the way from there to the pixels; as `LensletBench`.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class SeparableLenslets:
         )
 
     def images(self, dz: float, points: Sequence[Point]) -> Iterator[tuple[np.ndarray, float]]:
-        """Samples ((2 reach + 1) N, the same) of points (ky, kx) at a depth, in order; as `Bench.image`."""
+        """Samples ((2 reach + 1) N, the same) of points (ky, kx), in order; as of `LensletBench`."""
         turns, modes, missing = self._modes(dz, len(points))
         middle = points[len(points) // 2]
         told = self.fine, 1, self.accuracy
@@ -124,7 +124,7 @@ class SeparableLenslets:
         return each(image, points)
 
     def lights(self, dz: float, points: Sequence[Point]) -> Iterator[np.ndarray]:
-        """Intensities on the fine grid behind the lenslets, as `Bench.lights`; where samples are splines'."""
+        """Intensities on the fine grid behind lenslets, for splines' samples; as `LensletBench.lights`."""
         turns, modes, _ = self._modes(dz, len(points))
         fields = self._fields(turns, modes, points)
         return each(lambda point: self._light(fields(point)), points)

@@ -1,8 +1,8 @@
 """Light of missing lenslets in the images of a cell's points, where two axes are not apart.
 
-Images are computed of those points from which all others follow (`few_points.Chosen`). The lenslets that
-exist lie between limits, so that their light is a difference of sums from one side: each lenslet is followed
-once for all states of a cell, each row of them once for all that differ along y.
+Images are computed of those points from which all others follow (`point_subset.ChosenPoints`). The lenslets
+that exist lie between limits, so that their light is a difference of sums from one side: each lenslet is
+followed once for all states of a cell, each row of them once for all that differ along y.
 """
 
 import math

@@ -34,7 +34,7 @@ OVERSAMPLING = 1.5
 
 
 def is_followed(camera: HasOptics) -> bool:
-    """Whether coherent light is followed exactly: by a lens and plates, to lenslets that are not turned."""
+    """True if coherent light is followed exactly: by a lens and plates, to lenslets that are not turned."""
     plain = camera.optics()
     if plain.lattice is not None and plain.lattice.rotation:
         return False
@@ -76,7 +76,7 @@ def coherent_image(
 
 
 def _on_sensor(camera: CameraOptics, modes: np.ndarray, grid: Grid, distance: float) -> np.ndarray:
-    """Of a camera without lenslets."""
+    """Raw image in coherent light of a camera without lenslets."""
     pixels, pitch = camera.sensor.grid, _cells.airy(camera) / (2 * OVERSAMPLING)
     ny, nx = (math.ceil(size / pitch) + 2 * HALF_WIDTH + 2 for size in pixels.size)
     plane = Grid(
@@ -92,7 +92,7 @@ def _on_sensor(camera: CameraOptics, modes: np.ndarray, grid: Grid, distance: fl
 
 
 def _farthest(y: np.ndarray, x: np.ndarray) -> float:
-    """Along an axis [m]."""
+    """Farthest coordinate of places along an axis [m]."""
     return float(max(np.abs(y).max(), np.abs(x).max()))
 
 
@@ -110,7 +110,7 @@ class _Stop:
         self.weight = share * (math.pi * half**2)
 
     def lights(self, modes: np.ndarray) -> list[np.ndarray]:
-        """Of each of several planes (modes, y, x), where they fit in memory."""
+        """Light in the stop of each of several planes (modes, y, x), where they fit in memory."""
         memory.require(
             8.0 * len(modes) * len(self.v) * len(self.u), f"light of {len(modes)} modes in the stop",
             "Use fewer modes, a smaller object or a smaller stop.", SamplingError,
@@ -118,7 +118,7 @@ class _Stop:
         return [self.light(mode) for mode in modes]
 
     def light(self, amplitude: np.ndarray) -> np.ndarray:
-        """At the nodes, times their weights: for an even amplitude of 1, 1 arrives on the lenslets."""
+        """Light at the nodes, times their weights: for an even amplitude of 1, 1 arrives on the lenslets."""
         squared, grid = self.camera.wavelength * self.distance, self.grid
         down, across = (
             np.exp(1j * np.pi / squared * (c**2 - 2 * nodes[:, None] * c)).astype(np.complex64)

@@ -1,17 +1,10 @@
-r"""Incoherent raw images without speckle: the lenslet-periodic operator.
+"""Incoherent raw images without speckle: the lenslet-periodic operator.
 
-Under incoherent light the intensity on the sensor is linear in the object's, and a lenslet array repeats
-itself. Two facts make this a matrix product:
-
-1. For each place s on the sensor, the intensity h(s; x) of an object point x is band-limited in x by the
-   main lens, at D/(λz). So an object is represented by points :math:`\delta \le \lambda z/(2D)` apart.
-2. In the Fresnel approximation, without the phase exp(iπw²/(λL)) of the lenslet plane (Talanov's lens
-   transformation), the camera is telecentric: b becomes b L/(L + b), the sensor is magnified by 1 + b/L
-   afterwards, and moving the object point by c z/L moves the intensity by exactly c, a cell of the array.
-
-So only the points of one cell have images of their own (`point_images`). The raw image is a sum over
-neighbouring cells of (cells × points) · (points × samples of a cell), each matrix in few factors
-(`kernels`); cells at the border of the array have what is missing there subtracted.
+Intensity on the sensor is linear in the object's, band-limited in an object point's place, and repeats itself
+with the lenslets, but for a magnification. So only the points of one cell have images of their own
+(`cell_images`). The raw image is a sum over neighbouring cells of (cells × points) · (points × samples of a
+cell), each matrix in few factors (`kernels`); cells at the border of the array have what is missing there
+subtracted. See docs/theory/periodic.md.
 
 M. Broxton et al., Opt. Express 21, 25418 (2013) use the same periodicity in a light-field microscope.
 """
@@ -216,7 +209,7 @@ class _OffsetGroup:
 
     @property
     def _seen(self) -> tuple[slice, slice, slice]:
-        """Of the object's cells."""
+        """Slices of the object's cells."""
         return self.rows, _slice(self._span()), slice(None)
 
     def _places(self) -> Iterator[tuple[slice, slice]]:
@@ -334,7 +327,7 @@ def periodic_operator(
 
 @dataclass(frozen=True, slots=True)
 class _OperatorMaker:
-    """How an operator is made."""
+    """Settings with which an operator is made."""
 
     accuracy: float
     folder: str | PathLike[str] | None
@@ -348,7 +341,10 @@ class _OperatorMaker:
 def _varying(
     camera: CameraOptics, grid: Grid, dz: float, making: _OperatorMaker, fields: Fields | None = None
 ) -> Linear:
-    """Of a plane before a lens that changes over the field; `fields`, its own where the grid has more."""
+    """Operator of a plane before a lens that changes over the field.
+
+    `fields` are those of the plane's own samples, where the grid has more.
+    """
     if camera.objects is not None:
         return seen_plane(
             camera, grid, dz, lambda one, seen, depth, known: _varying(one, seen, depth, making, known)
@@ -382,7 +378,7 @@ def _varying(
 
 
 def mirrored_operator(operator: PeriodicOperator, turn: Turn) -> PeriodicOperator:
-    """With the same matrices, of what the main lens makes of mirrored light."""
+    """Operator with the same matrices, of what the main lens makes of mirrored light."""
 
     def before(spread: Linear) -> Chain:
         return Chain((spread, Mirror(spread.shape[0], turn).T))

@@ -43,7 +43,7 @@ class Mirror(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of the mirrored plane, and of the plane."""
+        """Shapes of the mirrored plane, and of the plane."""
         return (self.plane[::-1] if self.turn[0] else self.plane), self.plane
 
     def _forward(self, intensity: Array) -> Array:
@@ -59,7 +59,7 @@ class Mirror(Linear):
 
 
 def turns(optics: Optics) -> tuple[Turn, ...]:
-    """That leave the optics as they are, but for what the main lens does to a field; the first is `SAME`."""
+    """Turns that leave the optics as they are, but for the main lens' action on a field; first is `SAME`."""
     cells = optics.cells
     middle = all(
         abs(2 * edge + size * n) < 1e-9 * size
@@ -76,14 +76,14 @@ def turns(optics: Optics) -> tuple[Turn, ...]:
 
 
 def _is_round(element: Element) -> bool:
-    """Whether light from a mirrored field comes out of an element mirrored."""
+    """True if light from a mirrored field comes out of an element mirrored."""
     if isinstance(element, FieldPlate):
         return element.aberrations.y is None and all(noll_to_nm(j)[1] == 0 for j, _ in element.more)
     return isinstance(element, ThinLens)
 
 
 def of_fields(turns: Sequence[Turn], rotation: float) -> np.ndarray:
-    """What turns of lenslets that stand at an angle [rad] do to fields (y, x): matrices (n, 2, 2)."""
+    """Matrices (n, 2, 2) of fields (y, x) for turns of lenslets that stand at an angle [rad]."""
     sin, cos = math.sin(rotation), math.cos(rotation)
     straight = np.array([[cos, -sin], [sin, cos]])
     found = []

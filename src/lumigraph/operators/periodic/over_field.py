@@ -40,7 +40,7 @@ class WeightedMap(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of the map."""
+        """Shapes of the map."""
         return self.of.shape
 
     def _weighed(self, raw: Array) -> Array:
@@ -56,12 +56,12 @@ class WeightedMap(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of the map and the weights [bytes]."""
+        """Memory of the map and the weights [bytes]."""
         return self.of.memory_bytes + sum(factor.nbytes for factor in self.factors)
 
     @property
     def error(self) -> float:
-        """Of the map."""
+        """Relative rms error of the map."""
         return self.of.error
 
 
@@ -81,7 +81,7 @@ def over_field(camera: CameraOptics, at: Callable[[Pair], Linear]) -> Sum:
 
 
 def _places(camera: CameraOptics) -> tuple[np.ndarray, np.ndarray]:
-    """Where pixels look at the straight array (ny, nx), or along its axes [m]; they are turned by 180°."""
+    """Places of the straight array that pixels, turned by 180°, look at (ny, nx), or along its axes [m]."""
     grid, scale = camera.sensor.grid, -1 / (1 + _cells.lenslet_distance(camera) / camera.separation)
     y, x = grid.y[:, None] * scale, grid.x[None, :] * scale
     rotation = 0.0 if camera.lattice is None else camera.lattice.rotation

@@ -212,7 +212,7 @@ class PartlyHidden:
         return (rows.start * ky, columns.start * kx), image
 
     def _wave(self, place: np.ndarray, off: np.ndarray) -> np.ndarray:
-        """In the main lens (pupil, pupil), of a point whose image is `off` the origin [m]."""
+        """Wave in the main lens (pupil, pupil), of a point whose image is `off` the origin [m]."""
         wave, at = self.wave, place * (-self.optics.distance / self.optics.camera.separation)
         for shadow in self.cast:
             wave = wave * shadow.amplitude(float(at[0]), float(at[1]))

@@ -1,14 +1,10 @@
-r"""Opaque screens before the main lens, and what is left in the lens of the light of points behind them.
+"""Opaque screens before the main lens, and what is left in the lens of the light of points behind them.
 
-A point's light spreads to the lens as a cone. In the Fresnel approximation a screen at z before the lens
-leaves in it, of the amplitude of a point x at Z, a factor that depends on one place of the screen only,
-
-.. math:: V_x(u) = 1 - \frac{1}{i \lambda q} \int O(w') e^{i \pi (w' - w)^2 / (\lambda q)} d^2w', \quad
-          w = \frac{z}{Z} x + \frac{Z - z}{Z} u, \quad q = \frac{z (Z - z)}{Z}
-
-with the screen's opacity O. Several screens multiply, which is exact unless edges of two of them stand within
-some Fresnel zones of each other as a point sees them. Samples of an opacity are small rectangles, so
-that the integral is one of Fresnel's along each axis; what edges send farther than `FARTHEST` fades out.
+A point's light spreads to the lens as a cone, so that in the Fresnel approximation a screen multiplies its
+amplitude there by a factor that depends on one place of the screen only (docs/theory/periodic.md). Several
+screens multiply, which is exact unless edges of two of them stand within some Fresnel zones of each other as
+a point sees them. Samples of an opacity are small rectangles; what edges send farther than `FARTHEST` fades
+out.
 """
 
 import math
@@ -53,7 +49,7 @@ class Screen:
     distance: float
 
     def turned(self, angle: float) -> "Screen":
-        """In a frame that is turned about the axis, as lenslets are [rad]; samples get their area's share."""
+        """Screen in a frame turned about the axis, as lenslets are [rad]; samples get their area's share."""
         if not angle:
             return self
         sin, cos = math.sin(angle), math.cos(angle)
@@ -73,7 +69,7 @@ class Screen:
 
 
 class Shadow:
-    """What a screen does to the light of a plane behind it.
+    """Shadow of a screen in the light of a plane behind it.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from lumigraph.operators.sampling.cells import Cells
 
 
 class BlockImages(Protocol):
-    """Of points, with the lenslets of one state."""
+    """Images of points, with the lenslets of one state."""
 
     def line(self, dy: int) -> Line:
         """Blocks of the cells of one row, by their column."""

@@ -41,7 +41,7 @@ class Span:
 
     @property
     def positions(self) -> np.ndarray:
-        """Of the samples (count,) [m]."""
+        """Positions of the samples (count,) [m]."""
         return (self.first + np.arange(self.count)) * self.pitch
 
     @property

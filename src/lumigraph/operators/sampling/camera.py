@@ -66,7 +66,7 @@ class CameraOptics:
 
     @property
     def lattice(self) -> Lattice | None:
-        """Where the lenslets stand [m]."""
+        """Lattice on which the lenslets stand [m]; None without them."""
         return None if self.array is None else self.array.lattice
 
 
@@ -74,5 +74,5 @@ class HasOptics(Protocol):
     """An instrument with a main lens, or its values themselves."""
 
     def optics(self) -> CameraOptics:
-        """What an operator reads of it."""
+        """Values of the instrument that an operator reads."""
         ...

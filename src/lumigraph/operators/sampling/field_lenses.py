@@ -3,12 +3,10 @@ r"""Main lenses whose aberrations change over the field: images of all their poi
 Intensity behind the lens of a field θ is linear in what that lens makes of two places of light, which is
 smooth in θ. So the images of all fields follow from those of a few, chosen ones,
 
-.. math:: A(\theta) = \sum_r \varphi_r(\theta) A_r, \quad
-          \varphi_r(\theta) = \sum_k T_{rk} \ell_k(\theta),
+.. math:: A(\theta) = \sum_r \varphi_r(\theta) A_r
 
-with Lagrange's polynomials on n × n Chebyshev nodes and the matrix T of an interpolative decomposition: the
-lenses at the nodes from those of some of them. Images of a few points behind all of them tell which,
-how many, and how far off fields between the nodes are, which is stated.
+(docs/theory/lenslets.md). Images of a few points behind them tell which, how many, and how far off fields
+between them are, which is stated.
 """
 
 import math
@@ -52,7 +50,7 @@ Image = Callable[[CameraOptics], np.ndarray]
 
 
 def plate_of(camera: CameraOptics) -> FieldPlate | None:
-    """What changes over the field; None where nothing does."""
+    """Plate of the main lens that changes over the field; None where nothing does."""
     return next((part for part in camera.lens.elements if isinstance(part, FieldPlate)), None)
 
 
@@ -142,7 +140,7 @@ class FieldLenses:
         return list(dict.fromkeys(one.source for one in self.chosen))
 
     def weights(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Of the chosen lenses (R, ny, nx), for fields at y (ny,) and x (nx,)."""
+        """Weights of the chosen lenses (R, ny, nx), for fields at y (ny,) and x (nx,)."""
         down, across = (
             lagrange(self.shares.shape[1], (np.asarray(at) - middle) / half)
             for at, middle, half in zip((y, x), self.middle, self.half, strict=True)
@@ -258,7 +256,7 @@ TRIED = ((0.97, 0.93), (-0.88, 0.31), (0.05, -0.6), (-0.41, -0.77))
 
 @dataclass(frozen=True, slots=True)
 class _LensSearch:
-    """For the lenses of fields around a `middle`, up to `half` of them away; see `lenses`."""
+    """Search for the lenses of fields around a `middle`, up to `half` of them away; see `lenses`."""
 
     seen: Callable[[Pair], np.ndarray]
     middle: Pair
@@ -267,7 +265,7 @@ class _LensSearch:
     mirrors: np.ndarray
 
     def with_nodes(self, count: int) -> FieldLenses:
-        """With so many nodes along each axis."""
+        """Lenses that are found with so many nodes along each axis."""
         places = [self._field(y, x) for y in nodes(count) for x in nodes(count)]
         known = np.array([self.seen(place) for place in places])
         chosen, rows = self._chosen(places, known)
@@ -326,12 +324,12 @@ class FieldOperator(Sum):
 
     @property
     def memory_bytes(self) -> float:
-        """Of the operators, those that mirror others not counted, and of their shares [bytes]."""
+        """Memory of the operators, those that mirror others not counted, and of their shares [bytes]."""
         return self.held + 4.0 * len(self.maps) * math.prod(self.shape[0])
 
     @property
     def error(self) -> float:
-        """Of the operators, and of fields between those of their lenses."""
+        """Relative rms error of the operators, and of fields between those of their lenses."""
         return math.hypot(max(part.error for part in self.maps), self.left)
 
 
@@ -343,7 +341,7 @@ def operator(
     of: Callable[[CameraOptics], M],
     mirrored: Callable[[M, int], Linear] | None = None,
 ) -> FieldOperator:
-    """Of a plane at a distance [m], by operators `of` cameras with one lens and `mirrored` ones."""
+    """Operator of a plane at a distance [m], by operators `of` cameras with one lens and `mirrored` ones."""
     weights = found.weights(grid.y / distance, grid.x / distance).astype(np.float32)
     known = {source: of(at(camera, *source)) for source in found.sources}
     maps: list[Linear] = []

@@ -77,7 +77,7 @@ class Distorted(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of the plane that is seen, and of the object."""
+        """Shapes of the plane that is seen, and of the object."""
         return self.sizes
 
     def _forward(self, intensity: Array) -> Array:
@@ -90,12 +90,12 @@ class Distorted(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of both matrices [bytes]."""
+        """Memory of both matrices [bytes]."""
         return float(sum(m.data.nbytes + m.indices.nbytes for m in (self.across, self.down)))
 
 
 def _plain(array: Array) -> np.ndarray:
-    """On the CPU, where sparse matrices are; no gradient goes through them."""
+    """Array on the CPU, where sparse matrices are; no gradient goes through them."""
     if getattr(array, "requires_grad", False):
         raise GeometryError(
             "the object asks for gradients, which do not go through a lens of glass. Use operator.adjoint, "
@@ -105,7 +105,7 @@ def _plain(array: Array) -> np.ndarray:
 
 
 def distorted(space: ObjectSpace, grid: Grid, distance: float, finest: float) -> tuple[Distorted, Grid]:
-    """From samples before the glass to those of the thin lens, at most `finest` apart [m], and these.
+    """Map from samples before the glass to those of the thin lens, at most `finest` apart [m], and these.
 
     Raises
     ------
@@ -154,7 +154,7 @@ Entries = tuple[np.ndarray, np.ndarray]
 
 
 def _placed(places: np.ndarray, samples: np.ndarray, pitch: float) -> Entries:
-    """Of points (lines, points) [m] on samples."""
+    """Entries, values and numbers of samples, of points (lines, points) [m] on samples."""
     at = (places - samples[0]) / pitch
     numbers = np.floor(at).astype(int)[..., None] + np.arange(1 - HALF_WIDTH, HALF_WIDTH + 1)
     values = kernel(at[..., None] - numbers)

@@ -1,4 +1,4 @@
-"""What the lenslet-periodic operator of one depth depends on, and its sizes."""
+"""Values that the lenslet-periodic operator of one depth depends on, and its sizes."""
 
 import hashlib
 import math
@@ -19,7 +19,7 @@ VERSION = 24
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Optics:
-    """What the kernels of one depth depend on.
+    """Values that the kernels of one depth depend on.
 
     Parameters
     ----------
@@ -48,14 +48,14 @@ class Optics:
     def of(
         cls, camera: HasOptics, distance: float, accuracy: float, blurred: float | None = None
     ) -> "Optics":
-        """Of a plane at a distance from the main lens [m]; `blurred`, that of the most blurred of several."""
+        """Optics of a plane at a distance from the main lens; `blurred`, that of the most blurred [m]."""
         plain, fineness = camera.optics(), SamplingRules(accuracy)
         array, widest = _cells.lenslet_array(plain), distance if blurred is None else blurred
         cells = _cells.cells_of(plain, array, fineness, widest)
         return cls(plain, array, cells, fineness, distance, widest)
 
     def alike(self, camera: HasOptics) -> "Optics":
-        """Of a camera that hardly differs, with as many cells, points and samples, at a depth as far away."""
+        """Optics of a camera that hardly differs, with as many cells, points and samples, as far away."""
         plain = camera.optics()
         array = _cells.lenslet_array(plain)
         own, mine = _cells.placed_cells(plain, array), self.cells
@@ -66,12 +66,12 @@ class Optics:
 
     @property
     def bricks(self) -> "Optics":
-        """With a cell around each lenslet, as the matrices have them."""
+        """Optics with a cell around each lenslet, as the matrices have them."""
         return replace(self, cells=_cells.bricks_of(self.camera, self.array, self.fineness, self.blurred))
 
     @property
     def rotation(self) -> float:
-        """Of the array [rad]; the cells lie in a frame that turns with it."""
+        """Rotation of the array [rad]; the cells lie in a frame that turns with it."""
         return 0.0 if self.camera.lattice is None else self.camera.lattice.rotation
 
     @property
@@ -89,17 +89,17 @@ class Optics:
 
     @property
     def straight(self) -> bool:
-        """Whether what the lenslets do along y does not depend on x."""
+        """True if what the lenslets do along y does not depend on x."""
         return self.array.shape == "square" and not isinstance(self.array.focal_length, tuple)
 
     @property
     def precision(self) -> type[np.floating]:
-        """Of the right factors: half of it, off by 2e-4, where those are many and the accuracy allows."""
+        """Precision of the right factors: half, off by 2e-4, where those are many and the accuracy allows."""
         return np.float32 if self.straight or self.fineness.accuracy < 1e-3 else np.float16
 
     @property
     def spill(self) -> float:
-        """How far a micro-image reaches over its lenslet's edge [m]."""
+        """Length by which a micro-image reaches over its lenslet's edge [m]."""
         return _cells.spill(self.camera)
 
     @property
@@ -121,7 +121,7 @@ class Optics:
 
     @property
     def _aside(self) -> float:
-        """How far beyond a cell light comes into it [m]."""
+        """Distance beyond a cell from which light comes into it [m]."""
         pitch = self.array.lattice.pitch
         if self.followed_to is not None:
             return self.followed_to * pitch
@@ -129,7 +129,7 @@ class Optics:
 
     @property
     def beside(self) -> float:
-        """How far beyond a lenslet its light is followed, as `SamplingRules.beside`, to a quarter pitch [m].
+        """Distance beyond a lenslet to which its light is followed, to a quarter pitch [m].
 
         Depths whose points light much the same share what lenslets do to light.
         """
@@ -138,7 +138,7 @@ class Optics:
 
     @property
     def _lit_alike(self) -> tuple[float, float, Edges]:
-        """What tells how far lenslets send light aside."""
+        """Fresnel number, blur [m] and edges, which tell how far lenslets send light aside."""
         return _cells.fresnel_number(self.camera), self.blur, _cells.edges(self.array)
 
     @property
@@ -160,12 +160,12 @@ class Optics:
 
     @property
     def followed(self) -> float:
-        """How far a point's light is followed inside the array [pitches]."""
+        """Distance to which a point's light is followed inside the array [pitches]."""
         return self.fineness.reach(*self._spread) / self.array.lattice.pitch
 
     @property
     def lit(self) -> float:
-        """How far from a point's image lenslets are lit [m]: as far as their light is followed."""
+        """Distance from a point's image to which lenslets are lit [m]: as far as their light is followed."""
         return (self.followed + 1) * self.array.lattice.pitch
 
     @property
@@ -186,7 +186,7 @@ class Optics:
 
     @property
     def missed(self) -> float:
-        """How far a point's light is followed at the border of the array [pitches]."""
+        """Distance to which a point's light is followed at the border of the array [pitches]."""
         farther = 1 if _cells.edges(self.array) == "straight" else 0
         return self.fineness.near(*self._spread) / self.array.lattice.pitch + farther
 

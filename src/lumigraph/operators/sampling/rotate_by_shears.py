@@ -36,7 +36,7 @@ class CroppedPlane(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of what is left, and of the plane."""
+        """Shapes of what is left, and of the plane."""
         y, x = (n - 2 * m for n, m in zip(self.whole, self.margin, strict=True))
         return (y, x), self.whole
 
@@ -70,7 +70,7 @@ class ShearRotation(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of the plane, twice."""
+        """Shapes of the plane, twice."""
         return self.grid.shape, self.grid.shape
 
     def _forward(self, intensity: Array) -> Array:

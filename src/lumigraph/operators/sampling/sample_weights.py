@@ -1,4 +1,4 @@
-"""How much of each sample of an object counts."""
+"""Weights of an object's samples: the share of each that counts."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -20,7 +20,7 @@ class SampleWeights(Linear):
 
     @property
     def shape(self) -> tuple[Shape, Shape]:
-        """Of the samples, twice."""
+        """Shape of the samples, twice."""
         return self.through.shape, self.through.shape
 
     def _forward(self, intensity: Array) -> Array:
@@ -31,5 +31,5 @@ class SampleWeights(Linear):
 
     @property
     def memory_bytes(self) -> float:
-        """Of the shares [bytes]."""
+        """Memory of the shares [bytes]."""
         return self.through.nbytes
