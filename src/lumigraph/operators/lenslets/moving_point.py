@@ -33,8 +33,8 @@ def changed_intensity(
     lit: Any,
     phases: Sequence[Array],
 ) -> Array:
-    """Intensity of a point of 1, and derivatives (n + 1, y, x) by phases (nodes, nodes) in the main lens."""
-    wave = numbers["wave"]
+    """Intensity of a point of 1 and its derivatives (n + 1, y, x) by phases in the main lens."""
+    wave = main_lens.wave(xp, numbers)
     waves = xp.stack([wave, *(1j * phase * wave for phase in phases)])
     fields = own.field(xp, {**numbers, "wave": waves}, prepared, source, lit)
     return intensities(xp, fields[0], [fields[k + 1] for k in range(len(phases))])

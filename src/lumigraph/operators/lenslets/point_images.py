@@ -155,9 +155,11 @@ class PointImages:
             found += gradient.along()
         return found + sum(read_anew(own, ends, light[n], one) for n, one in enumerate(weights))
 
-    def _some(self, own: SampledCamera, given: Sequence[Any], x: np.ndarray) -> Iterator[_Some]:
+    def _some(
+        self, cameras: tuple[SampledCamera, list[Both]], given: Sequence[Any], x: np.ndarray
+    ) -> Iterator[_Some]:
         """Points that shine, a few at a time, by depth."""
-        points, where = given
+        (own, ends), (points, where) = cameras, given
         order = np.argsort(points.positions[:, 2], kind="stable")
         order = order[x[:, order].any(0)]
         for k in range(0, len(order), TOGETHER):
@@ -290,5 +292,5 @@ def _require_as_thin(camera: CameraOptics, other: CameraOptics) -> None:
 
 
 def one_lens(camera: CameraOptics) -> bool:
-    """True if points of all fields are seen through the same thin lens."""
+    """Whether points of all fields are seen through the same thin lens."""
     return camera.objects is None and field_lenses.plate_of(camera) is None

@@ -57,7 +57,7 @@ def _round(lens: Train) -> ThinLens | None:
 def paraxial_light(
     camera: CameraOptics, distance: float, widest: float, samples: int = PUPIL
 ) -> "RoundPupilLight | SampledPupilLight":
-    """Light of a point behind a paraxial lens, with derivatives; so many samples across it, at least."""
+    """As `point_light` of a paraxial camera; so many samples across the lens, at least."""
     lens = _cells.lens(camera)
     if (first := _round(lens)) is not None:
         half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation
@@ -66,11 +66,6 @@ def paraxial_light(
         far = airy * 2 ** (math.ceil(8 * math.log2(max(widest / airy, 1.0))) / 8)  # points share it
         return RoundPupilLight(_radial(half, squared, np.pi / camera.wavelength * focus, far))
     return SampledPupilLight(camera, lens, distance, widest, samples)
-
-
-def by_distance(camera: CameraOptics, distance: float, rho: np.ndarray) -> np.ndarray:
-    """Slope of the phase at rho from a lens' middle [m] by the distance of the point [rad/m]."""
-    return -np.pi / camera.wavelength * (rho / distance) ** 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,19 +147,3 @@ class SampledPupilLight:
             light = np.vdot(pupil, pupil).real * squared**2 / np.prod(grid.pitch)
             self._pupil.extend((grid, pupil * np.sqrt(_cells.stop_area(self.lens) / light)))
         return self._pupil[0], self._pupil[1]
-
-    def changes(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Derivatives (3, y, x) of `at` by y, x and the point's distance."""
-        grid, pupil = self.behind()
-        turn = -2j * np.pi / (self.camera.wavelength * self.camera.separation)
-        down, across = np.exp(turn * np.outer(y, grid.y)), np.exp(turn * np.outer(grid.x, x))
-        right, left = pupil @ across, pupil @ (across * grid.x[:, None])
-        wide = pupil @ (across * grid.x[:, None] ** 2)
-        deeper = 1j * by_distance(self.camera, self.distance, np.ones(1))
-        bent = (down * grid.y**2) @ right + down @ wide
-        return np.stack([(turn * down * grid.y) @ right, turn * (down @ left), deeper * bent])
-
-    def turned(self, phase: np.ndarray) -> "SampledPupilLight":
-        """Change of the light with a factor of this phase (y, x) [rad] on the pupil's grid."""
-        grid, pupil = self.behind()
-        return replace(self, _pupil=[grid, 1j * phase * pupil])
