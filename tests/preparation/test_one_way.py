@@ -107,12 +107,14 @@ def test_a_camera_file_that_contradicts_the_picture_is_told_with_both_pitches(be
     scope = lg.LightFieldMicroscope.from_catalogue("lfm-guv")
     lengths = {"pixel_pitch": f"{scope.lenslets.pitch / PITCH * 1.02 * 1e6} um"}
     scope = scope.replace(sensor=lengths)
-    raw, white = (lg.open(bench / f"{name}.tiff") for name in ("raw", "white"))
+    raw, white, dark = (lg.open(bench / f"{name}.tiff") for name in ("raw", "white", "dark"))
     with pytest.warns(SamplingWarning, match=r"12\.40\d px.*12\.157 px .* a relay of 1\.02 instead of 1\."):
-        ready = lg.prepare(raw, white=white, camera=scope)
+        ready = lg.prepare(raw, white=white, dark=dark, camera=scope)
     assert ready.calibration.pixel_pitch == scope.sensor.pixel_pitch
     agreeing = scope.replace(relay_magnification=1.02)
-    assert any("they agree" in note for note in lg.prepare(raw, white=white, camera=agreeing).notes)
+    assert any(
+        "they agree" in note for note in lg.prepare(raw, white=white, dark=dark, camera=agreeing).notes
+    )
 
 
 def test_a_raw_image_alone_says_what_it_implies_about_the_camera_file(bench):
