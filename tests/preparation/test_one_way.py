@@ -189,7 +189,8 @@ def test_frames_of_a_batch_share_one_finding_of_the_lattice_and_a_new_white_imag
 ):
     found = []
     monkeypatch.setattr(given, "calibrate", lambda white: found.append(1) or calibrate(white))
-    files, raw = given.Given(white=bench / "white.tiff"), lg.open(bench / "raw.tiff")
+    files = given.Given(white=bench / "white.tiff", dark=bench / "dark.tiff")
+    raw = lg.open(bench / "raw.tiff")
     for _ in range(3):
         ready = files.prepared(raw)
         assert "the lattice was found on the white image" in ready.notes
