@@ -167,8 +167,8 @@ def test_pictures_of_a_raw_image_calibrated_alone_have_no_seams(folder, name):
 
 
 def test_how_many_lenslets_are_left_out_is_always_said(bench):
-    white = lg.open(bench / "white.tiff")
-    ready = lg.prepare(lg.open(bench / "raw.tiff"), white=white)
+    white, dark = lg.open(bench / "white.tiff"), lg.open(bench / "dark.tiff")
+    ready = lg.prepare(lg.open(bench / "raw.tiff"), white=white, dark=dark)
     whole = ready.calibration
     assert f"left out: 0 of {len(ready.lenslets.reasons)} lenslets" in ready.notes
     ready = lg.prepare(lg.open(bench / "raw.tiff"), replace(whole, missing=np.array([[0, 0], [2, 1]])))
