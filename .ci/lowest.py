@@ -14,7 +14,7 @@ ELSEWHERE = {
 }
 """Extras whose lowest versions are not installed, and why."""
 
-TOOLS = ("hypothesis", "httpx", "pytest", "pytest-timeout")
+TOOLS = ("array-api-strict", "hypothesis", "httpx", "pytest", "pytest-timeout")
 """Of the extra "dev", those that the tests need."""
 
 

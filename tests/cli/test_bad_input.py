@@ -140,7 +140,7 @@ FILES = {
     "folder named .zarr": ("w.zarr", lambda p: p.mkdir(), ["w.zarr is a folder without zarr.json"]),
     "missing file": ("w.png", lambda p: None, ["w.png does not exist"]),
     "misspelt file": ("whte.tiff", lambda p: None, ["whte.tiff does not exist", "Did you mean white.tiff"]),
-    "unknown extension": ("w.bmp", lambda p: p.touch(), ["w.bmp", ".png", ".tiff", ".zarr"]),
+    "unknown extension": ("w.xyz", lambda p: p.touch(), ["w.xyz", ".png", ".tiff", ".zarr"]),
     "garbage in a Zarr": ("w.zarr", garbage_zarr, ["w.zarr is damaged"]),
     "NaN": ("w.tiff", nan_tiff, ["w.tiff has 1 NaN", "(3, 4)"]),
     "one pixel": ("w.png", lambda p: io.save(np.ones((1, 1), np.uint8), p), ["1 x 1"]),

@@ -1,11 +1,14 @@
 """Pictures that were mixed up, full pixels in any container, views out of order."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, shift
 
+import cameras
+from lumigraph.cli.simulate import SceneOptions
 from lumigraph.core.raw import RawImage
 from lumigraph.core.saturation import saturation_level, with_bits
 from lumigraph.errors import CalibrationError, FormatError, SamplingWarning
@@ -13,6 +16,7 @@ from lumigraph.io.cameras import from_cameras
 from lumigraph.preparation import doubts
 from lumigraph.preparation.beside import ReferenceImages
 from lumigraph.rendering import check_arrangement
+from lumigraph.simulation import simulate
 
 Y, X = np.mgrid[:300, :360]
 LIGHT = 0.3 + 0.7 * (np.cos(np.pi * (Y - 74) / 15) * np.cos(np.pi * (X - 89) / 15)) ** 2
@@ -40,6 +44,24 @@ def test_a_picture_without_full_pixels_has_none_and_given_bits_count():
         with_bits(full, 17)
 
 
+@pytest.mark.parametrize("scene", ["white", "usaf1951", "slanted_edge", "chessboard"])
+@pytest.mark.parametrize("camera", [cameras.focused, cameras.plenoptic])
+def test_scenes_that_lumigraph_draws_have_no_full_pixels(scene, camera):
+    """Micro-images without noise repeat their values: a heap at the maximum is no chance there."""
+    described, drawn = camera(), SceneOptions(scene=[scene])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SamplingWarning)  # of a target's finest bars
+        image = np.asarray(simulate(described, drawn.built(described)).data, float)
+    for bits in (8, 10, 12, 14, 16):
+        values = np.round(0.8 * image / image.max() * (2**bits - 1)).astype(
+            np.uint8 if bits == 8 else np.uint16
+        )
+        assert saturation_level(RawImage(values, bit_depth=8 if bits == 8 else 16)) is None
+        exposed = replace(described.sensor, bits=bits).expose(image, rng=np.random.default_rng(0))
+        level = saturation_level(exposed)
+        assert level is None or exposed.data.max() < level
+
+
 def test_white_and_raw_swapped_are_noticed():
     scene, white = raw(3000 * SCENE * LIGHT), raw(3500 * LIGHT, 1)
     assert doubts.mixed_up(scene, white, 15) is None
@@ -52,6 +74,20 @@ def test_a_dark_image_given_as_white_is_named():
         doubts.check_kinds(raw(3000 * SCENE * LIGHT), ReferenceImages(dark))
     with pytest.raises(CalibrationError, match="Swap the two"):
         doubts.check_kinds(raw(3000 * SCENE * LIGHT), ReferenceImages(dark, raw(3500 * LIGHT)))
+
+
+def test_a_floor_is_measured_without_a_white_image_and_none_is_where_there_is_none():
+    smooth = 0.1 + 0.9 * (1 + np.sin(X / 60) * np.cos(Y / 70)) / 2
+    gaps = np.clip(LIGHT - 0.35, 0, None)  # dark between the micro-images
+    for scene in (smooth, SCENE):
+        told = doubts.floor_under(raw(3000 * scene * gaps + 200), ReferenceImages(), 15)
+        assert told is not None
+        assert abs(float(told.split("about ")[1].split(",")[0]) - 200) < 8
+    for scene in (smooth, SCENE, np.ones_like(SCENE)):
+        for light in (gaps, LIGHT):
+            assert doubts.floor_under(raw(3000 * scene * light + 5), ReferenceImages(), 15) is None
+    dark = raw(np.full(LIGHT.shape, 200.0), 2)
+    assert doubts.floor_under(raw(3000 * smooth * gaps + 200), ReferenceImages(dark=dark), 15) is None
 
 
 def test_an_offset_left_in_is_measured_and_none_is_where_there_is_none():

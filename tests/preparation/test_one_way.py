@@ -107,12 +107,14 @@ def test_a_camera_file_that_contradicts_the_picture_is_told_with_both_pitches(be
     scope = lg.LightFieldMicroscope.from_catalogue("lfm-guv")
     lengths = {"pixel_pitch": f"{scope.lenslets.pitch / PITCH * 1.02 * 1e6} um"}
     scope = scope.replace(sensor=lengths)
-    raw, white = (lg.open(bench / f"{name}.tiff") for name in ("raw", "white"))
+    raw, white, dark = (lg.open(bench / f"{name}.tiff") for name in ("raw", "white", "dark"))
     with pytest.warns(SamplingWarning, match=r"12\.40\d px.*12\.157 px .* a relay of 1\.02 instead of 1\."):
-        ready = lg.prepare(raw, white=white, camera=scope)
+        ready = lg.prepare(raw, white=white, dark=dark, camera=scope)
     assert ready.calibration.pixel_pitch == scope.sensor.pixel_pitch
     agreeing = scope.replace(relay_magnification=1.02)
-    assert any("they agree" in note for note in lg.prepare(raw, white=white, camera=agreeing).notes)
+    assert any(
+        "they agree" in note for note in lg.prepare(raw, white=white, dark=dark, camera=agreeing).notes
+    )
 
 
 def test_a_raw_image_alone_says_what_it_implies_about_the_camera_file(bench):
@@ -165,8 +167,8 @@ def test_pictures_of_a_raw_image_calibrated_alone_have_no_seams(folder, name):
 
 
 def test_how_many_lenslets_are_left_out_is_always_said(bench):
-    white = lg.open(bench / "white.tiff")
-    ready = lg.prepare(lg.open(bench / "raw.tiff"), white=white)
+    white, dark = lg.open(bench / "white.tiff"), lg.open(bench / "dark.tiff")
+    ready = lg.prepare(lg.open(bench / "raw.tiff"), white=white, dark=dark)
     whole = ready.calibration
     assert f"left out: 0 of {len(ready.lenslets.reasons)} lenslets" in ready.notes
     ready = lg.prepare(lg.open(bench / "raw.tiff"), replace(whole, missing=np.array([[0, 0], [2, 1]])))
@@ -187,7 +189,8 @@ def test_frames_of_a_batch_share_one_finding_of_the_lattice_and_a_new_white_imag
 ):
     found = []
     monkeypatch.setattr(given, "calibrate", lambda white: found.append(1) or calibrate(white))
-    files, raw = given.Given(white=bench / "white.tiff"), lg.open(bench / "raw.tiff")
+    files = given.Given(white=bench / "white.tiff", dark=bench / "dark.tiff")
+    raw = lg.open(bench / "raw.tiff")
     for _ in range(3):
         ready = files.prepared(raw)
         assert "the lattice was found on the white image" in ready.notes

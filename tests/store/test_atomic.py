@@ -153,3 +153,49 @@ def test_what_the_system_refuses_is_one_line_that_names_the_file(tmp_path, error
         raise error
     assert (tmp_path / "a").read_bytes() == b"old"
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+def replaced(path, content):
+    with store.replacing(path) as temporary:
+        for name in ("a", "b", "c"):
+            (temporary / name).mkdir(parents=True)
+            (temporary / name / "x").write_text(content)
+
+
+@pytest.mark.skipif(atomic.fcntl is None, reason="nothing is removed without locks")
+@pytest.mark.parametrize("exchanges", [True, False])
+def test_the_mark_of_a_workplace_goes_last(tmp_path, monkeypatch, exchanges):
+    """A kill after it would leave what no start knows, and removes."""
+    left, unlink = [], os.unlink
+
+    def watched(path, *, dir_fd=None):
+        if path == "workplace":
+            left.append(os.listdir(dir_fd))  # noqa: PTH208 - of an open folder
+        unlink(path, dir_fd=dir_fd)
+
+    if not exchanges:
+        monkeypatch.setattr(atomic, "_exchanged", lambda *_: False)
+    monkeypatch.setattr(os, "unlink", watched)
+    for content in ("old", "new"):
+        replaced(tmp_path / "f", content)
+    assert left == [["workplace"], ["workplace"]]
+    assert [path.name for path in tmp_path.iterdir()] == ["f"]
+    assert (tmp_path / "f" / "c" / "x").read_text() == "new"
+
+
+@pytest.mark.parametrize("error", [OSError(5, "Input/output error"), KeyboardInterrupt()])
+def test_a_folder_that_cannot_take_its_place_leaves_the_old_one(tmp_path, monkeypatch, error):
+    replaced(tmp_path / "f", "old")
+    rename = atomic.Path.rename
+
+    def failing(self, target):
+        if self.name == "new":
+            raise error
+        return rename(self, target)
+
+    monkeypatch.setattr(atomic, "_exchanged", lambda *_: False)
+    monkeypatch.setattr(atomic.Path, "rename", failing)
+    with pytest.raises((FormatError, KeyboardInterrupt)):
+        replaced(tmp_path / "f", "new")
+    assert [path.name for path in tmp_path.iterdir()] == ["f"]
+    assert (tmp_path / "f" / "a" / "x").read_text() == "old"

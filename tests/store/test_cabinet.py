@@ -125,6 +125,51 @@ def test_the_files_not_used_for_longest_go(folder, monkeypatch):
     assert sorted(path.name.split(".")[0] for path in folder.iterdir()) == ["mine", "new", "old", "oldest"]
 
 
+def precious_text(path, away):
+    path.write_bytes(b"precious" * 2000)
+
+
+def precious_link(path, away):
+    store.write(away, {"a": np.zeros(9000)})
+    path.symlink_to(away)
+
+
+def precious_link_to_nothing(path, away):
+    path.symlink_to(away)
+
+
+def precious_second_name(path, away):
+    store.write(away, {"a": np.zeros(9000)})
+    os.link(away, path)
+
+
+def precious_folder(path, away):
+    path.mkdir()
+
+
+def precious_of_another_user(path, away):
+    if os.name == "nt" or os.geteuid() != 0:
+        pytest.skip("only root gives files to others")
+    store.write(path, {"a": np.zeros(9000)})
+    os.chown(path, 12345, -1)
+
+
+@pytest.mark.parametrize("made", [value for name, value in sorted(globals().items()) if "precious_" in name])
+def test_a_full_cache_removes_only_what_it_has_made(folder, tmp_path, monkeypatch, made):
+    monkeypatch.setattr(array_cache, "LIMIT", 3000)
+    folder.mkdir()
+    made(folder / "mine.kept.npz", tmp_path / "away")
+    before = sorted(tmp_path.rglob("*"))
+    for key in ("old", "new"):
+        store.kept(key, lambda: {"data": np.zeros(1000, np.uint8)})
+        os.utime(folder / f"{key}.kept.npz", (1000, 1000))
+    store.kept("newest", lambda: {"data": np.zeros(1000, np.uint8)})
+    left = {path for path in tmp_path.rglob("*") if path not in before}
+    assert set(before) <= set(tmp_path.rglob("*"))
+    assert folder / "newest.kept.npz" in left
+    assert len(left) == 2  # two of 1400 bytes fit
+
+
 def test_clocks_that_jump_change_nothing_but_what_goes_first(folder):
     store.kept("key", built)
     for moment in (0, 2**31 - 1, 4e9):

@@ -65,7 +65,7 @@ def test_reading_removes_what_dead_writers_left(tmp_path, monkeypatch):
     """A run that finds all it needs writes nothing, and what the last one left would stay."""
     monkeypatch.setattr(atomic, "_SWEPT", set())
     store.write(tmp_path / "a.npz", ARRAYS)
-    (tmp_path / ".lumigraph-dead").mkdir()
+    (tmp_path / ".lumigraph-0123456789ab").mkdir(mode=0o700)
     atomic._SWEPT.clear()  # as in another process
     store.read(tmp_path / "a.npz")
     assert [path.name for path in tmp_path.iterdir()] == ["a.npz"]

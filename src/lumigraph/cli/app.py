@@ -133,7 +133,7 @@ def _optional(text: str) -> str:
 
     def option(found: re.Match[str]) -> str:
         name, value = found.groups()
-        if name == "views":  # of a mosaic: to the command line they are the input
+        if name == "views" and verb is not convert:  # of a mosaic: to the command line they are the input
             return f"--mosaic {value}".rstrip()
         return f"--{name}{' ' * bool(value)}{value}" if name in names else found[0]
 

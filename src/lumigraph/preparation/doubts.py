@@ -20,6 +20,9 @@ _DIFFERENT, _FEWEST = 0.2, 12
 _SEEN, _SURE = 0.01, 6.0
 """An offset that is worth a word, as a share of the raw image's range, and in standard errors."""
 
+_RISE, _ALIKE_FLOORS = 0.1, 0.2
+"""Rise of the tiles' brightness, as a share of the range, that shows a floor; spread of it, at most."""
+
 _MOST_TILES, _WINDOW = 60, 5  # along each axis; tiles that are averaged for what is smooth
 
 
@@ -116,6 +119,35 @@ def left_in(raw: RawImage, beside: ReferenceImages, pitch: float) -> str | None:
     return (
         f"raw image and white image both have an offset of about {offset:.3g}, {offset / wide:.1%} of the "
         "raw image's range, which is no light: it makes what is dark too bright. Give the dark image."
+    )
+
+
+def floor_under(raw: RawImage, beside: ReferenceImages, pitch: float) -> str | None:
+    """What to say of a floor under the raw image where there is neither a white image nor a dark one.
+
+    Gaps between micro-images are dark: where the darkest pixels of all tiles are alike, however bright the
+    brightest ones are, they show the floor.
+
+    Parameters
+    ----------
+    raw, beside
+        The pictures.
+    pitch
+        Of the micro-images [px].
+    """
+    if beside.white is not None or beside.dark is not None or black_plane(raw) is not None:
+        return None
+    scene = _grey(raw)
+    floors, tops = np.quantile(_tiles(scene, pitch), (0.02, 0.9), axis=(2, 3)).reshape(2, -1)
+    dim, bright = np.quantile(tops, (0.2, 0.8))
+    offset, least, most = (float(value) for value in np.quantile(floors, (0.5, 0.05, 0.95)))
+    wide = float(np.quantile(scene, 0.99) - np.quantile(scene, 0.01))
+    alike = most - least < _ALIKE_FLOORS * min(offset, bright - dim)
+    if len(tops) < _FEWEST or offset < _SEEN * wide or bright - dim < _RISE * wide or not alike:
+        return None
+    return (
+        f"the raw image has a floor of about {offset:.3g}, {offset / wide:.1%} of its range, however bright "
+        "its parts are: an offset of the sensor, or light everywhere. Give the dark image if the sensor's"
     )
 
 

@@ -19,7 +19,7 @@ from lumigraph.core.saturation import saturation_level
 from lumigraph.errors import CalibrationError, SamplingWarning
 from lumigraph.preparation.agreement import Described, implied
 from lumigraph.preparation.beside import ReferenceImages, above, black_plane, coloured
-from lumigraph.preparation.doubts import check_kinds, doubts_of
+from lumigraph.preparation.doubts import check_kinds, doubts_of, floor_under
 from lumigraph.preparation.drift import check_drift
 from lumigraph.preparation.validity import pixel_reasons, verdicts
 from lumigraph.preparation.vignetting import vignetting
@@ -99,6 +99,8 @@ def prepare(
     for doubt in (beside.doubt(raw), *(() if pitch is None else doubts_of(raw, beside, pitch))):
         if doubt:
             _warn(notes, doubt)
+    floor = None if pitch is None else floor_under(raw, beside, pitch)
+    notes += [] if floor is None else [floor]
     reasons = pixel_reasons(raw, beside, found, _mask(mask, raw))
     lenslets = None if found is None else verdicts(reasons, found)
     notes = (*notes, *beside.notes(raw, divide=divide), *_full(raw), *_counted(reasons, lenslets))

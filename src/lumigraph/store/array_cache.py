@@ -108,8 +108,8 @@ def _own(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _tidy(where: Path) -> None:
-    """Remove the files that were not used for longest, until the rest fits."""
-    files = [(path, path.stat()) for path in where.glob(f"*{_ENDING}")]
+    """Remove the files that were not used for longest, until the rest fits; only what `sealed.write` made."""
+    files = [(path, path.lstat()) for path in where.glob(f"*{_ENDING}") if sealed.is_own(path)]
     total = 0
     for path, status in sorted(files, key=lambda pair: pair[1].st_mtime, reverse=True):
         total += status.st_size

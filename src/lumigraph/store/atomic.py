@@ -156,8 +156,11 @@ def _workplace(folder: Path) -> Iterator[Path]:
     try:
         yield place
     finally:
-        shutil.rmtree(place, ignore_errors=True)
-        if lock is not None:
+        if lock is None:
+            shutil.rmtree(place, ignore_errors=True)
+        else:
+            with suppress(OSError):
+                _dismantle(lock, place)
             os.close(lock)
 
 
@@ -207,16 +210,20 @@ def _clear(place: Path) -> None:
     if lock is None:
         return
     try:
-        if not _is_ours(lock, place.name):
-            return
-        _put_back(lock, place.parent)
-        for name in (_NEW, _OLD):
-            _remove(name, lock)
-        with suppress(FileNotFoundError):
-            os.unlink(_MARK, dir_fd=lock)  # last: a kill before it leaves what is still known as ours
-        place.rmdir()
+        if _is_ours(lock, place.name):
+            _dismantle(lock, place)
     finally:
         os.close(lock)
+
+
+def _dismantle(folder: int, place: Path) -> None:
+    """Remove an open workplace; its mark goes last, so that after a kill the next start still knows it."""
+    _put_back(folder, place.parent)
+    for name in (_NEW, _OLD):
+        _remove(name, folder)
+    with suppress(FileNotFoundError):
+        os.unlink(_MARK, dir_fd=folder)
+    place.rmdir()
 
 
 def _is_ours(folder: int, name: str) -> bool:
@@ -305,7 +312,11 @@ def _take_place(temporary: Path, target: Path) -> None:
         old.parent.mkdir()
         _flush_entry(temporary.with_name(_MARK))  # after a cut of the power, too, the old folder goes back
         target.rename(old)
-        temporary.rename(target)
+        try:
+            temporary.rename(target)
+        except BaseException:
+            old.rename(target)
+            raise
 
 
 def _exchanged(one: Path, other: Path) -> bool:
