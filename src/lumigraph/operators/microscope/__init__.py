@@ -7,3 +7,8 @@
 - `pupil*`: images as functions of the pupil's phase; `medium`, `multislice`, refracting samples
 - `fourier_*`: Fourier light-field microscopes
 """
+
+import lazy_loader
+
+# Names load when they are first used: a description needs no operator, and no other kind of camera.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
