@@ -16,8 +16,9 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.linear import Linear
-from lumigraph.design import plenoptic1, plenoptic2, resolution
+from lumigraph.design import plenoptic1, resolution
 from lumigraph.design.layout import LensletLayout
+from lumigraph.design.matching import Diameters, diameters
 from lumigraph.elements import LensletArray, Scatter, TiltAndBow, Train
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import grids
@@ -38,7 +39,7 @@ class LensletCamera(CameraGradients):
     """A main lens, lenslets and a sensor."""
 
     lenslets: Lenslets
-    matching: Literal["views", "full"] = "views"
+    matching: Literal["views", "full", "touching"] = "views"
     model: Model = "paraxial"
     built: Built = Field(default_factory=Built)
     tolerances: Tolerances = Field(default_factory=dict)
@@ -108,17 +109,21 @@ class LensletCamera(CameraGradients):
         return self.built.scatter(self.lenslets.index)
 
     @property
-    def matched_diameter(self) -> float:
-        """Main-lens diameter that `matching` asks for, before anything was built [m]."""
+    def diameters(self) -> Diameters:
+        """Main-lens diameters by the words of `design.matching`, before anything was built [m]."""
         length, b = self._described_separation, self._described_lenslet_distance
-        if self.matching == "full":
-            return plenoptic2.full_diameter(self.lenslets.pitch, length, b)
-        return plenoptic2.views_diameter(self.lenslets.pitch, self.image_distance, b)
+        return diameters(self.lenslets.pitch, self.image_distance, length, b)
+
+    @property
+    def intended_diameter(self) -> float:
+        """Main-lens diameter that `matching` asks for, before anything was built [m]."""
+        matched, full, touching = self.diameters
+        return {"views": matched, "full": full, "touching": touching}[self.matching]
 
     @property
     def pupil_diameter(self) -> float:
-        """Diameter D of the main lens' stop [m]: as given, or matched to the lenslets."""
-        return self.main_lens.diameter or self.matched_diameter
+        """Diameter D of the main lens' stop [m]: as given, or as `matching` has it."""
+        return self.main_lens.diameter or self.intended_diameter
 
     @property
     def micro_image_pitch(self) -> float:

@@ -35,7 +35,7 @@ class PlenopticCamera(LensletCamera):
     sensor
         `Pixels`; without a shape all micro-images fit.
     matching
-        "views" or "full", which are the same here.
+        "views" or "full", which are the same here, or "touching": see `design.matching`.
     model
         "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration, or
         lenslets of glass, and Rayleigh and Sommerfeld's integral, for square lenslets of one focal length;
