@@ -13,15 +13,15 @@ class Diameters(NamedTuple):
 
     Micro-images are D b/L wide and stand p (1 + b/L) apart; they fill D b/(p (L + b)) of that distance.
 
-    ========  =============  ==========================================  ====================  ==================
-    word      D              micro-images                                thesis                ``matching =``
-    ========  =============  ==========================================  ====================  ==================
-    matched   p z2/b         as wide as p z2/L: f-numbers z2/D = b/p      eq. 5.11, eq. 5.15    "views"
-    full      p L/b          as wide as a lenslet, p                     none                  "full"
-    touching  p (L + b)/b    as wide as their distance: no gap is left   figures 6.6 and 6.7   "touching"
-    ========  =============  ==========================================  ====================  ==================
+    ========  ===========  =============================  ================  ==============
+    word      D            micro-images                   thesis            ``matching =``
+    ========  ===========  =============================  ================  ==============
+    matched   p z2/b       as wide as p z2/L: z2/D = b/p  eq. 5.11, 5.15    "views"
+    full      p L/b        as wide as a lenslet, p        none              "full"
+    touching  p (L + b)/b  as wide as their distance      figures 6.6, 6.7  "touching"
+    ========  ===========  =============================  ================  ==============
 
-    Before a camera 1.0, L = z2, matched and full are one. A microscope is telecentric, L = ∞, and all three are
+    In a camera 1.0, L = z2: matched and full are one. A microscope is telecentric, L = ∞: all three are
     `microscope.matched_f_number`.
     """
 
