@@ -5,7 +5,10 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
+from types import ModuleType
 
 import pytest
 
@@ -40,9 +43,51 @@ def test_importing_lumigraph_imports_nothing_heavy():
 
 def test_cameras_wait_for_no_statistics():
     """`scipy.signal` imports `scipy.stats`: a quarter of a second of each first image."""
-    code = "import sys, lumigraph.instruments; print({'scipy.stats', 'matplotlib'} & set(sys.modules))"
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert out.stdout.strip() == "set()"
+    code = "from lumigraph.instruments import *; from lumigraph.simulation import *"
+    assert not {"scipy.stats", "matplotlib"} & _modules_after(code)
+
+
+@pytest.mark.parametrize(
+    ("camera", "home"),
+    [
+        ("thesis-2f", "single_lens"),
+        ("thesis-plenoptic-1", "plenoptic1"),
+        ("thesis-plenoptic-2-m050", "plenoptic2"),
+        ("lfm-worm", "microscope"),
+    ],
+)
+def test_loading_a_camera_imports_its_own_kind_and_nothing_that_computes(camera, home):
+    loaded = _modules_after(f"import lumigraph as lg; lg.load_camera({camera!r})")
+    assert sum(name.split(".")[0] == "lumigraph" for name in loaded) <= 140
+    kinds = {
+        f"lumigraph.instruments.{kind}" for kind in ("single_lens", "plenoptic1", "plenoptic2", "microscope")
+    }
+    assert loaded & kinds == {f"lumigraph.instruments.{home}"}
+    rooms = (
+        "simulation|deconvolution|depth|rendering|calibration|preparation|scene|operators.(periodic|lenslets)"
+    )
+    assert not [name for name in loaded if re.match(rf"lumigraph\.({rooms})", name)]
+    # pydantic and NumPy, but none of SciPy's libraries, each as slow as all of lumigraph
+    assert not {"scipy.fft", "scipy.special", "scipy.interpolate", "scipy.sparse", "scipy.ndimage"} & loaded
+
+
+@pytest.mark.parametrize("package", ["instruments", "operators", "operators.microscope"])
+def test_names_that_load_late_are_never_the_modules_they_come_from(package):
+    """A module of the same name would take the name's place as soon as somebody else imports it."""
+    late = import_module(f"lumigraph.{package}")
+    for module in iter_modules(late.__path__, f"{late.__name__}."):
+        import_module(module.name)
+    assert late.__all__
+    assert not [name for name in late.__all__ if isinstance(getattr(late, name), ModuleType)]
+
+
+def _modules_after(code: str) -> set[str]:
+    """Names of all modules that a fresh interpreter has loaded after some lines."""
+    run = subprocess.run(
+        [sys.executable, "-c", f"{code}\nimport sys; print(*sys.modules)"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return set(run.stdout.split())
 
 
 def test_import_floors_hold():

@@ -30,6 +30,8 @@ class Bench:
     calibration: Calibration
     lenslets: Lenslets = Lenslets()
     wavelength: float = 633e-9
+    micro_image_width: float = PITCH
+    micro_image_pitch: float = PITCH
 
 
 def lattice(distance=DISTANCE, rotation=0.0, origin=(0.0, 0.0)):
@@ -103,8 +105,8 @@ def test_gaps_and_overlaps_are_measured_and_the_matching_lens_is_told(relative, 
     found = diagnose(discs(grid, relative * pitch), camera)
     assert found.faults == ((fault,) if fault else ())
     assert found.width / (found.width + found.gap) == pytest.approx(relative, abs=0.012)
-    assert found.matching_diameter == pytest.approx(pitch * PIXEL * SEPARATION / sharp, rel=1e-3)
-    assert found.diameter / found.matching_diameter == pytest.approx(relative, abs=0.012)
+    assert found.intended_diameter == pytest.approx(pitch * PIXEL * SEPARATION / sharp, rel=1e-3)
+    assert found.diameter / found.intended_diameter == pytest.approx(relative, abs=0.012)
     assert ("as it was meant" in found.report()) == (not fault)
 
 

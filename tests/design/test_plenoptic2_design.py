@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lumigraph.design import plenoptic2, resolution
+from lumigraph.design import matching, plenoptic2, resolution
 from lumigraph.errors import GeometryError
 
 P, FM, F, Z1 = 150e-6, 5.2e-3, 0.06, 0.12
@@ -22,7 +22,8 @@ def test_table_5_2(m, a, b, diameter):
     distance = plenoptic2.lenslet_distance(FM, m)
     assert distance == pytest.approx(b * 1e-3, abs=0.01e-3)
     assert plenoptic2.relay_distance(FM, m) == pytest.approx(a * 1e-3, abs=0.01e-3)
-    assert plenoptic2.views_diameter(P, Z1, distance) == pytest.approx(diameter * 1e-3, abs=0.01e-3)
+    found = matching.diameters(P, Z1, Z1 + a * 1e-3, distance)
+    assert found.matched == pytest.approx(diameter * 1e-3, abs=0.01e-3)
 
 
 @pytest.mark.parametrize(
@@ -31,7 +32,7 @@ def test_table_5_2(m, a, b, diameter):
 )
 def test_tables_5_3_and_5_4(m, main_lobe, rendered_lobe, main_cutoff, rendered_cutoff):
     a, b = plenoptic2.relay_distance(FM, m), plenoptic2.lenslet_distance(FM, m)
-    f_number = resolution.f_number(Z1, plenoptic2.views_diameter(P, Z1, b))
+    f_number = resolution.f_number(Z1, matching.diameters(P, Z1, Z1 + a, b).matched)
     assert f_number == pytest.approx(b / P, rel=1e-12)
     assert 2 * resolution.airy_first_zero(WAVELENGTH, f_number) == pytest.approx(main_lobe * 1e-6, abs=1e-6)
     assert plenoptic2.rendered_lobe(633e-9, P, a) == pytest.approx(rendered_lobe * 1e-6, abs=0.1e-6)
@@ -95,13 +96,6 @@ def test_the_patch_tiles_neighbouring_micro_images():
     apart = (P / length) * z2
     assert plenoptic2.patch(P, m, z2, length) == pytest.approx(m * apart, rel=1e-12)
     assert plenoptic2.patch(P, -m, z2, length) < 0
-
-
-def test_the_full_diameter_fills_a_lenslet():
-    b, length = 7.8e-3, 0.1356
-    full, views = plenoptic2.full_diameter(P, length, b), plenoptic2.views_diameter(P, 0.12, b)
-    assert full * b / length == pytest.approx(P, rel=1e-12)
-    assert views / full == pytest.approx(0.12 / length, rel=1e-12)
 
 
 @pytest.mark.parametrize("m", [0.0, -1.0, -2.0])

@@ -193,9 +193,9 @@ def test_a_multi_focus_array_does_not_fit_a_plenoptic_camera_1(write):
     refused(GeometryError, r"lenslets\.focal_length has 3 lengths, but .* Give one", write(text))
 
 
-def test_matching_is_one_of_two(write):
+def test_matching_is_one_of_three(write):
     text = EXAMPLE.replace("[main_lens]", "matching = 'half'\n[main_lens]")
-    refused(GeometryError, r"matching: 'half' is not 'views' or 'full'", write(text))
+    refused(GeometryError, r"matching: 'half' is not 'views', 'full' or 'touching'", write(text))
 
 
 def test_files_that_are_no_camera_files(write, tmp_path):

@@ -34,7 +34,7 @@ def test_a_slider_changes_one_value_and_the_file_says_so():
     answer = viewer.designer_site(FOCUSED, "f").calls["design"]({"values": {"lenslets.pitch": 120.0}})
     assert 'pitch = "120 um"' in answer["toml"]
     matched = camera.changed({"main_lens.diameter": None})
-    assert matched.pupil_diameter == pytest.approx(matched.matched_diameter)
+    assert matched.pupil_diameter == pytest.approx(matched.intended_diameter)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_a_slider_changes_one_value_and_the_file_says_so():
         ({"lenslets.pitch": 10**400}, FormatError, "must be a finite number"),
         pytest.param({"lenslets.count.0": 10**5000}, FormatError, "must be a finite number", id="long"),
         ({"lenslets.count.0": 1000}, FormatError, "must be a whole number from 1 to 301"),
-        ({"matching": "none"}, FormatError, "must be views or full"),
+        ({"matching": "none"}, FormatError, "must be views or full or touching"),
         ({"object_distance": 50.0}, GeometryError, "inside the main lens' focal length"),
         ([1], FormatError, "values must be numbers by their keys"),
     ],

@@ -29,7 +29,7 @@ LEAST_BEND = 0.02
 LEAST_PULL = 0.05
 """The same of another pitch: what overlapping neighbours that are missing on all sides do."""
 LEAST_GAP = 0.03
-"""Smallest gap over the pitch. Below these limits a difference is no fault."""
+"""Smallest change of the gap, over the pitch. Below these limits a difference is no fault."""
 
 _CELL = 32  # samples of a folded micro-image per axis
 _SIGMAS = 4.0  # of their standard errors must pitch and tilt differ, too
@@ -66,6 +66,16 @@ class IntendedCamera(Protocol):
         """Wavelength in vacuum [m]."""
         ...
 
+    @property
+    def micro_image_width(self) -> float:
+        """Width of the micro-images by ray optics [m]."""
+        ...
+
+    @property
+    def micro_image_pitch(self) -> float:
+        """Distance between neighbouring micro-images [m]."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
@@ -90,10 +100,13 @@ class Diagnosis:
         Width of the micro-images by ray optics: the main lens seen through a lenslet [m].
     gap
         Pitch minus width [m]: dark between micro-images, below 0 an overlap.
-    diameter, matching_diameter
-        Diameter of the main lens that explains the width, and the one with which micro-images touch [m].
+    intended_gap
+        The same as the camera has it, of this pitch [m].
+    diameter, intended_diameter
+        Diameter of the main lens that explains the width, and the one that makes the intended gap [m].
     faults
-        The names of what is wrong; empty for a good camera.
+        The names of what is wrong; empty for a good camera. "gap": a wider one than intended, "overlap":
+        micro-images overlap more than intended, "wide": a narrower gap than intended.
     """
 
     rotation: float
@@ -104,14 +117,17 @@ class Diagnosis:
     pitch_gradient: tuple[float, float]
     width: float
     gap: float
+    intended_gap: float
     diameter: float
-    matching_diameter: float
+    intended_diameter: float
     faults: tuple[str, ...]
 
     def report(self) -> str:
         """One line for each fault, with its size and what to do."""
         um, mm = 1e6, 1e3
         moved = self.lenslet_distance - self.intended_distance
+        stop = f"the main lens from {self.diameter * mm:.2f} to {self.intended_diameter * mm:.2f} mm"
+        meant = f"{_gap_text(self.gap)} between micro-images, {_gap_text(self.intended_gap)} intended"
         texts = {
             "rotation": f"the lenslets are turned by {math.degrees(self.rotation):+.3f} deg: turn them back",
             "offset": f"the lenslets are shifted by ({self.offset[0] * um:+.1f}, {self.offset[1] * um:+.1f}) "
@@ -121,12 +137,15 @@ class Diagnosis:
             "tilt": f"the lenslets are tilted by ({math.degrees(self.tilt[0]):+.2f}, "
             f"{math.degrees(self.tilt[1]):+.2f}) deg: the pitch changes by "
             f"({self.pitch_gradient[0] * um:+.2f}, {self.pitch_gradient[1] * um:+.2f}) µm over the picture",
-            "gap": f"gaps of {self.gap * um:.1f} µm between micro-images: open the main lens from "
-            f"{self.diameter * mm:.2f} to {self.matching_diameter * mm:.2f} mm",
-            "overlap": f"micro-images overlap by {-self.gap * um:.1f} µm: close the main lens from "
-            f"{self.diameter * mm:.2f} to {self.matching_diameter * mm:.2f} mm",
+            "gap": f"{meant}: open {stop}",
+            "overlap": f"{meant}: close {stop}",
+            "wide": f"{meant}: close {stop}",
         }
         return "\n".join(texts[fault] for fault in self.faults) or "the camera is as it was meant"
+
+
+def _gap_text(gap: float) -> str:
+    return f"{'gaps' if gap >= 0 else 'overlaps'} of {abs(gap) * 1e6:.1f} µm"
 
 
 def diagnose(white: RawImage | Array, camera: IntendedCamera) -> Diagnosis:
@@ -138,7 +157,8 @@ def diagnose(white: RawImage | Array, camera: IntendedCamera) -> Diagnosis:
     .. math:: s = s_0 - s_0 \, (\theta \cdot s_0) / T
 
     which is fitted to their centres together with the lattice. Their width D b/L is fitted to the mean
-    micro-image: a disc, blurred as a lenslet blurs the main lens, by defocus and diffraction.
+    micro-image: a disc, blurred as a lenslet blurs the main lens, by defocus and diffraction. Gaps and
+    overlaps are compared with the camera's own, whichever of `design.matching` it follows.
 
     Parameters
     ----------
@@ -177,6 +197,7 @@ def diagnose(white: RawImage | Array, camera: IntendedCamera) -> Diagnosis:
     gradient = tuple(-2 * angle * pitch * n * pixel / (separation + distance) for angle, n in zip(
         tilt, found.shape, strict=True))  # fmt: skip
     diameter = width * separation / new_distance
+    fill = camera.micro_image_width / camera.micro_image_pitch
     rotation = _turn(found.lattice, intended.lattice)
     offset = _offset(_between(lattice) if between else lattice, intended.lattice, axis)
     sizes = {
@@ -185,12 +206,13 @@ def diagnose(white: RawImage | Array, camera: IntendedCamera) -> Diagnosis:
         "distance": abs(stretch - 1) / max(LEAST_STRETCH, LEAST_PULL / error.border, _SIGMAS * error.stretch),
         "tilt": math.hypot(*tilt)
         / max(LEAST_TILT, LEAST_BEND * error.total / error.border**2, _SIGMAS * error.tilt),
-        "gap": (1 - width / pitch) / LEAST_GAP,
-        "overlap": (width / pitch - 1) / LEAST_GAP,
+        "gap": (fill - ratio) / LEAST_GAP,
+        "overlap" if ratio > 1 else "wide": (ratio - fill) / LEAST_GAP,
     }
     return Diagnosis(
         rotation, (offset[0] * pixel, offset[1] * pixel), new_distance, distance, tilt,
-        (gradient[0], gradient[1]), width, pitch - width, diameter, pitch * separation / new_distance,
+        (gradient[0], gradient[1]), width, pitch - width, pitch * (1 - fill),
+        diameter, pitch * fill * separation / new_distance,
         tuple(name for name, size in sizes.items() if size > 1),
     )  # fmt: skip
 

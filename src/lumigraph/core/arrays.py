@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
-import scipy.fft
+import scipy  # its submodules load when they are first used
 from array_api_compat import array_namespace, device, is_numpy_array, is_torch_array
 
 Array = Any

@@ -8,6 +8,7 @@ from lumigraph.describe import lens_glass
 from lumigraph.design import plenoptic1 as design1
 from lumigraph.design import plenoptic2 as design2
 from lumigraph.design import resolution
+from lumigraph.design.matching import ALIKE
 from lumigraph.errors import SamplingError
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.description import TRADE_OFFS, Description, Row
@@ -183,7 +184,11 @@ def _diameter_source(camera: Camera) -> str:
     matching = getattr(camera, "matching", None)
     if camera.main_lens.diameter is not None or matching is None:
         return "D, given"
-    return "D = p L / b, full micro-images" if matching == "full" else "D = z2 p / b, f-numbers matched"
+    return {
+        "views": "D = z2 p / b, f-numbers matched",
+        "full": "D = p L / b, full micro-images",
+        "touching": "D = p (L + b) / b, touching micro-images",
+    }[matching]
 
 
 def _lenslets(camera: LensletCamera) -> Iterator[Row]:
@@ -322,17 +327,18 @@ def _warnings(camera: Camera) -> Iterator[str]:
 
 
 def _lenslet_warnings(camera: LensletCamera) -> Iterator[str]:
-    diameter, matched = camera.pupil_diameter, camera.matched_diameter
-    if not math.isclose(diameter, matched, rel_tol=0.01):
+    diameter, fill = camera.pupil_diameter, camera.micro_image_width / camera.micro_image_pitch
+    if diameter < min(camera.diameters) * (1 - ALIKE):
+        words = ", ".join(f"{word} {d * 1e3:.4g} mm" for word, d in camera.diameters._asdict().items())
         yield (
-            f"the main lens is {diameter * 1e3:.4g} mm wide where {matched * 1e3:.4g} mm match the lenslets: "
-            f"micro-images are {'larger' if diameter > matched else 'smaller'} than intended."
+            f"the main lens is {diameter * 1e3:.4g} mm wide, less than any of {words}: micro-images fill "
+            f"only {fill:.0%} of their distance."
         )
-    if camera.micro_image_width > camera.micro_image_pitch * (1 + 1e-9):
+    if fill > 1 + ALIKE:
         yield (
             f"micro-images overlap: {camera.micro_image_width * 1e6:.4g} µm wide, "
-            f"{camera.micro_image_pitch * 1e6:.4g} µm apart. Reduce the main lens' diameter below "
-            f"{camera.micro_image_pitch * camera.separation / camera.lenslet_distance * 1e3:.4g} mm."
+            f"{camera.micro_image_pitch * 1e6:.4g} µm apart. Reduce the main lens' diameter from "
+            f"{diameter * 1e3:.4g} to {diameter / fill * 1e3:.4g} mm, with which they touch."
         )
     width, smallest = camera.lenslets.pitch * camera.lenslets.fill_factor, _smallest(camera)
     if width < smallest:

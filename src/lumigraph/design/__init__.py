@@ -3,6 +3,7 @@
 - `thin_lens`: object and image distances, magnification
 - `resolution`: f-number, numerical aperture, cut-offs, Airy pattern, depth of field
 - `plenoptic1`, `plenoptic2`: cameras with lenslets at the main-lens image; focused ones, that relay it
+- `matching`: main-lens diameters, matched, full and touching
 - `microscope`: the light-field microscope, by depth
 - `layout`: the lengths that a ray diagram shows
 
@@ -10,6 +11,6 @@ Distances are positive along the light unless a function says otherwise. "The th
 PhD thesis that this project started from; equations that are misprinted there are given corrected here.
 """
 
-from lumigraph.design import microscope, plenoptic1, plenoptic2, resolution, thin_lens
+from lumigraph.design import matching, microscope, plenoptic1, plenoptic2, resolution, thin_lens
 
-__all__ = ["microscope", "plenoptic1", "plenoptic2", "resolution", "thin_lens"]
+__all__ = ["matching", "microscope", "plenoptic1", "plenoptic2", "resolution", "thin_lens"]

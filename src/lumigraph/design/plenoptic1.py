@@ -36,24 +36,6 @@ def micro_image_pitch(pitch: float, separation: float, lenslet_distance: float) 
     return p * (1 + checks.positive("lenslet_distance", lenslet_distance) / big_f)
 
 
-def matched_diameter(pitch: float, separation: float, lenslet_distance: float) -> float:
-    """Main-lens diameter whose images under the lenslets are one lenslet wide, p F / b [m].
-
-    Same f-number on both sides of the lenslets: F/D = b/p.
-
-    References
-    ----------
-    Ng et al., *Light field photography with a hand-held plenoptic camera*, Stanford CTSR 2005-02.
-
-    Examples
-    --------
-    >>> round(matched_diameter(150e-6, 0.24, 0.01) * 1e3, 6)
-    3.6
-    """
-    p, big_f = checks.positive("pitch", pitch), checks.positive("separation", separation)
-    return p * big_f / checks.positive("lenslet_distance", lenslet_distance)
-
-
 def smallest_lenslet(wavelength: float, focal_length: float) -> float:
     """Lenslet diameter below which its Airy lobe is wider than itself, sqrt(2.44 λ f_µ) [m].
 

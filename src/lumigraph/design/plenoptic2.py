@@ -52,40 +52,6 @@ def relay_distance(focal_length: float, magnification: float) -> float:
     return lenslet_distance(focal_length, magnification) / magnification
 
 
-def views_diameter(pitch: float, image_distance: float, lenslet_distance: float) -> float:
-    """Main-lens diameter with which 1/m lenslets per axis see each point, D = z2 p / b [m].
-
-    Micro-images are then filled to z2 / (z2 + a) of the lenslet pitch; `full_diameter` fills them.
-
-    References
-    ----------
-    Thesis eq. 5.11 and 5.15, where it is called a radius.
-
-    Examples
-    --------
-    >>> round(views_diameter(150e-6, 0.12, 7.8e-3) * 1e3, 2)
-    2.31
-    """
-    p, z2 = checks.positive("pitch", pitch), checks.positive("image_distance", image_distance)
-    return z2 * p / checks.positive("lenslet_distance", lenslet_distance)
-
-
-def full_diameter(pitch: float, separation: float, lenslet_distance: float) -> float:
-    """Main-lens diameter whose micro-images are one lenslet wide, D = p (z2 + a) / b [m].
-
-    References
-    ----------
-    Similar triangles from the edge of the main lens through the lenslets' centres.
-
-    Examples
-    --------
-    >>> round(full_diameter(150e-6, 0.1356, 7.8e-3) * 1e3, 2)
-    2.61
-    """
-    p, length = checks.positive("pitch", pitch), checks.positive("separation", separation)
-    return p * length / checks.positive("lenslet_distance", lenslet_distance)
-
-
 def patch(pitch: float, magnification: float, image_distance: float, separation: float) -> float:
     """Width on the sensor of the piece that tiles the picture without seams, m p z2 / L [m], signed.
 

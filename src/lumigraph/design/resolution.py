@@ -6,11 +6,9 @@ z2/D results hold in the image, with z1/D in the object.
 
 import math
 
-from scipy.special import jn_zeros
-
 from lumigraph.core import checks
 
-AIRY_ZERO = float(jn_zeros(1, 1)[0] / math.pi)
+AIRY_ZERO = 3.8317059702075125 / math.pi
 """First zero of the Airy pattern in units of λ F#: 1.2197, the zero of J1 over π, usually written 1.22."""
 
 

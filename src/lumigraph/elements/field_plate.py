@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+import scipy
 
 from lumigraph.core import checks
 from lumigraph.core.field import Field
@@ -200,7 +200,7 @@ def _through(nodes: Nodes, values: np.ndarray, at: float, parity: np.ndarray | N
     if len(where) == 1:
         return values[0]
     degree = min(3, len(where) - 1)
-    return make_interp_spline(where, values, k=degree)(at)
+    return scipy.interpolate.make_interp_spline(where, values, k=degree)(at)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

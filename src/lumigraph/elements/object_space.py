@@ -13,7 +13,7 @@ moves points besides: to where that thin lens has them where their chief rays ar
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+import scipy
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +33,7 @@ class ObjectSpace:
     pupil_magnification: float
     fields: tuple[float, ...]
     stretch: np.ndarray
-    _spline: list[BSpline] = field(default_factory=list, repr=False)
+    _spline: "list[scipy.interpolate.BSpline]" = field(default_factory=list, repr=False)
 
     def scale(self, y: np.ndarray, x: np.ndarray, distance: float | np.ndarray) -> np.ndarray:
         """Factor of places (y, x) before the glass [m], at a distance of the thin lens [m]."""
@@ -44,7 +44,7 @@ class ObjectSpace:
         if not self._spline:
             where, values = np.array(self.fields), np.asarray(self.stretch)
             both = np.concatenate((-where[:0:-1], where)), np.concatenate((values[:0:-1], values))
-            self._spline.append(make_interp_spline(*both, k=min(3, len(both[0]) - 1)))
+            self._spline.append(scipy.interpolate.make_interp_spline(*both, k=min(3, len(both[0]) - 1)))
         return self._spline[0](at)
 
     def depth(self, dz: float | np.ndarray) -> float | np.ndarray:

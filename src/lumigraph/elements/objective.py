@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.special import j0, j1, jv
+import scipy
 
 from lumigraph.core import checks
 from lumigraph.core.cache import remembered
@@ -256,9 +256,9 @@ def focus_intensity(objective: Objective, y: np.ndarray, x: np.ndarray, dz: floa
     radius, angle = np.hypot(y, x), np.arctan2(y, x)
     wave = np.sqrt(cosine) * weight * np.exp(1j * k * objective.index * cosine * dz)
     argument = k * objective.index * radius[..., None] * sine
-    first = (wave * (1 + cosine) * j0(argument)).sum(-1)
-    second = (wave * sine * j1(argument)).sum(-1)
-    third = (wave * (1 - cosine) * jv(2, argument)).sum(-1)
+    first = (wave * (1 + cosine) * scipy.special.j0(argument)).sum(-1)
+    second = (wave * sine * scipy.special.j1(argument)).sum(-1)
+    third = (wave * (1 - cosine) * scipy.special.jv(2, argument)).sum(-1)
     along, across = first + third * np.cos(2 * angle), third * np.sin(2 * angle)
     peak = (np.sqrt(cosine) * weight * (1 + cosine)).sum() ** 2
     return (np.abs(along) ** 2 + np.abs(across) ** 2 + 4 * np.abs(second * np.cos(angle)) ** 2) / peak

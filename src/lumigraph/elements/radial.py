@@ -5,8 +5,7 @@ from itertools import count
 from threading import Lock
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.special import j0, j1, jv
+import scipy
 
 _WEAK = 1e-5
 """Harmonics below this part of the strongest are left out."""
@@ -46,7 +45,9 @@ def tables_of(
             for signed in sorted({order, -order} & orders):
                 wave = amplitude * spectrum[signed]
                 real, imaginary = (bessel @ np.stack([wave.real, wave.imag], axis=1)).T
-                values = CubicSpline(np.arange(len(steps)), 1j**order * (real + 1j * imaginary))
+                values = scipy.interpolate.CubicSpline(
+                    np.arange(len(steps)), 1j**order * (real + 1j * imaginary)
+                )
                 table.append((signed, np.stack([values.c.real, values.c.imag])))
     return found
 
@@ -71,7 +72,7 @@ def _bessels(q: np.ndarray, steps: np.ndarray) -> Iterator[np.ndarray]:
         lower = argument < order
         near = lower & (argument > order - 12 * order ** (1 / 3))
         now[lower] = 0
-        now[near] = jv(order, argument[near])
+        now[near] = scipy.special.jv(order, argument[near])
         yield now
 
 
@@ -86,11 +87,13 @@ def _first(order: int, q: np.ndarray, steps: np.ndarray) -> np.ndarray:
         if key not in _FIRST:
             while len(_FIRST) > 5:
                 _FIRST.pop(next(iter(_FIRST)))
-            _FIRST[key] = (j0, j1, _j2)[order](np.arange(len(steps))[:, None] * (float(steps[1]) * q))
+            _FIRST[key] = (scipy.special.j0, scipy.special.j1, _j2)[order](
+                np.arange(len(steps))[:, None] * (float(steps[1]) * q)
+            )
         return _FIRST[key]
 
 
 def _j2(argument: np.ndarray) -> np.ndarray:
     """Bessel function J_2 by recurrence, three times as fast as jv."""
     near = np.where(argument > 0, argument, 1)
-    return 2 * j1(argument) / near - np.where(argument > 0, j0(argument), 0)
+    return 2 * scipy.special.j1(argument) / near - np.where(argument > 0, scipy.special.j0(argument), 0)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
+import scipy
 
 from lumigraph.core import checks
 from lumigraph.elements.form import TERMS
@@ -114,8 +114,8 @@ class Scatter:
     def of(self, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Focal-length factor, vertex offsets along columns and rows [m] and presence of lenslets (i, j)."""
         bend, down, across, there = (_uniform(i, j, self.seed, channel) for channel in range(4))
-        factor = 1 + self.focal_length * np.clip(ndtri(bend), -4, 4)
-        down, across = self.decentre * ndtri(down), self.decentre * ndtri(across)
+        factor = 1 + self.focal_length * np.clip(scipy.special.ndtri(bend), -4, 4)
+        down, across = self.decentre * scipy.special.ndtri(down), self.decentre * scipy.special.ndtri(across)
         for mine, one in self._among(i, j):
             factor[mine] *= 1 + one.focal_change
             down[mine] += one.vertex[0]
@@ -160,7 +160,8 @@ class Scatter:
     def warp(self, i: np.ndarray, j: np.ndarray) -> LensletWarp:
         """Tilt and form of the paths through lenslets (i, j)."""
         down, across, *terms = (
-            np.clip(ndtri(_uniform(i, j, self.seed, channel)), -4, 4) for channel in range(4, 6 + len(TERMS))
+            np.clip(scipy.special.ndtri(_uniform(i, j, self.seed, channel)), -4, 4)
+            for channel in range(4, 6 + len(TERMS))
         )
         return LensletWarp(
             self.turn * down, self.turn * across, self.form / math.sqrt(len(TERMS)) * np.stack(terms, -1)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import eval_jacobi
+import scipy
 
 from lumigraph.core import checks
 from lumigraph.core.field import Field
@@ -109,7 +109,7 @@ def zernike(j: int, rho: np.ndarray, theta: np.ndarray) -> np.ndarray:
     n, m = noll_to_nm(j)
     order = abs(m)
     k = (n - order) // 2
-    radial = (-1) ** k * rho**order * eval_jacobi(k, order, 0, 1 - 2 * np.square(rho))
+    radial = (-1) ** k * rho**order * scipy.special.eval_jacobi(k, order, 0, 1 - 2 * np.square(rho))
     if m == 0:
         return math.sqrt(n + 1) * radial * np.ones_like(theta)
     return math.sqrt(2 * (n + 1)) * radial * (np.cos(m * theta) if m > 0 else np.sin(order * theta))

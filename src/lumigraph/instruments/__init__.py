@@ -16,40 +16,7 @@
 - `quantities`, `problems`, `files`: numbers with units, errors in one line, TOML and the `catalogue`
 """
 
-from lumigraph.instruments.built import Built
-from lumigraph.instruments.camera import Camera
-from lumigraph.instruments.description import Description, Row
-from lumigraph.instruments.files import catalogue
-from lumigraph.instruments.instrument import Instrument
-from lumigraph.instruments.lenslet_camera import LensletCamera
-from lumigraph.instruments.lenslets import Lenslets
-from lumigraph.instruments.loading import load_camera
-from lumigraph.instruments.microscope import LightFieldMicroscope
-from lumigraph.instruments.microscope_objective import MicroscopeObjective
-from lumigraph.instruments.over_field import OverField
-from lumigraph.instruments.parts import MainLens, Pixels
-from lumigraph.instruments.plenoptic1 import PlenopticCamera
-from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
-from lumigraph.instruments.single_lens import SingleLensCamera
-from lumigraph.instruments.tolerances import Tolerance
+import lazy_loader
 
-__all__ = [
-    "Built",
-    "Camera",
-    "Description",
-    "FocusedPlenopticCamera",
-    "Instrument",
-    "LensletCamera",
-    "Lenslets",
-    "LightFieldMicroscope",
-    "MainLens",
-    "MicroscopeObjective",
-    "OverField",
-    "Pixels",
-    "PlenopticCamera",
-    "Row",
-    "SingleLensCamera",
-    "Tolerance",
-    "catalogue",
-    "load_camera",
-]
+# Names load when they are first used: a description needs no operator, and no other kind of camera.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from os import PathLike
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from pydantic import Field
 
@@ -20,7 +20,7 @@ from lumigraph.design import plenoptic1, resolution, thin_lens
 from lumigraph.design.layout import Layout, LensletLayout
 from lumigraph.elements import FieldPlate, LensletArray, ThinLens, Train, ZernikePlate
 from lumigraph.errors import GeometryError, ParaxialWarning
-from lumigraph.instruments import parameters, point_view
+from lumigraph.instruments import parameters
 from lumigraph.instruments.glass import GlassRequest, LensGlass, first_order, glass
 from lumigraph.instruments.glass_layout import glass_layout
 from lumigraph.instruments.glass_optics import ExitPupil, Traced, behind_glass, glass_warnings, traced
@@ -29,12 +29,14 @@ from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.making import Making
 from lumigraph.instruments.parameters import MagnificationRange, Parameter
 from lumigraph.instruments.parts import MainLens, Pixels
-from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.quantities import Length, Wavelength
 from lumigraph.operators import CameraOptics
 from lumigraph.propagation import Propagate
 from lumigraph.sensor import Sensor
-from lumigraph.simulation import Spectrum
+
+if TYPE_CHECKING:
+    from lumigraph.instruments.point_view import PointImage
+    from lumigraph.simulation import Spectrum
 
 
 class Camera(Instrument):
@@ -261,8 +263,10 @@ class Camera(Instrument):
         """A third of the distance from the focused plane to the focal length [m]."""
         return 0.3 * (self.object_distance - self.main_lens.focal_length)
 
-    def point_view(self, dz: float = 0.0) -> PointImage:
+    def point_view(self, dz: float = 0.0) -> "PointImage":
         """Image of a point on the axis at a depth `dz` [m] from the focused plane."""
+        from lumigraph.instruments import point_view
+
         self.defocused(dz)
         return point_view.of_camera(self, dz)
 
@@ -314,7 +318,7 @@ class Camera(Instrument):
         pixels: Sensor | None = None,
         folder: str | PathLike[str] | None = None,
         progress: Progress | None = None,
-        spectrum: Spectrum | None = None,
+        spectrum: "Spectrum | None" = None,
     ) -> Linear:
         """Exact operator of this camera for incoherent planes, for `lumigraph.deconvolve`.
 

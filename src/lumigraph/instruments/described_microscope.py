@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -22,9 +22,11 @@ from lumigraph.instruments.lenslets import Lenslets
 from lumigraph.instruments.microscope_objective import MicroscopeObjective
 from lumigraph.instruments.parts import Pixels
 from lumigraph.instruments.quantities import Displacement, Length, Positive, Wavelength
-from lumigraph.operators.microscope.cell import Lenslet
-from lumigraph.operators.microscope.fourier_microscope import Mosaic
 from lumigraph.sensor import Sensor
+
+if TYPE_CHECKING:
+    from lumigraph.operators.microscope.cell import Lenslet
+    from lumigraph.operators.microscope.fourier_microscope import Mosaic
 
 
 class DescribedMicroscope(Instrument):
@@ -142,8 +144,10 @@ class DescribedMicroscope(Instrument):
         )  # fmt: skip
 
     @property
-    def lenslet(self) -> Lenslet:
+    def lenslet(self) -> "Lenslet":
         """One lenslet and what stands behind it."""
+        from lumigraph.operators.microscope.cell import Lenslet
+
         part = self.lenslets
         return Lenslet(
             part.pitch, part.focal_length[0], self.lenslet_distance, self.magnification,
@@ -263,7 +267,9 @@ class DescribedMicroscope(Instrument):
         aperture = (self.objective.numerical_aperture, self.objective.immersion_index)
         return tuple(closed_form(self.wavelength, aperture, self.lenslet_size, dz) for dz in depths)
 
-    def _mosaic(self) -> Mosaic:
+    def _mosaic(self) -> "Mosaic":
+        from lumigraph.operators.microscope.fourier_microscope import Mosaic
+
         assert self.fourier_lens is not None  # checked above
         part, pitch = self.lenslets, self.pixels.pixel_pitch / self.relay_magnification
         centers, focal_lengths = part.each()

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from scipy.fft import next_fast_len
+import scipy
 
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingError
@@ -83,7 +83,7 @@ class Sampling:
 def _samples(half: float, pitch: float) -> int:
     """Samples of a window that covers `half` on either side, of a quick FFT size."""
     n = 2 * (math.ceil(half / pitch) + BORDER) + 1
-    return int(next_fast_len(n) or n) if n < 2**31 else n
+    return int(scipy.fft.next_fast_len(n) or n) if n < 2**31 else n
 
 
 def _grid(name: str, shape: list[int], pitch: float) -> Grid:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from os import PathLike
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from pydantic import ValidationError
 
@@ -18,11 +18,13 @@ from lumigraph.instruments import files
 from lumigraph.instruments.description import Description, Row
 from lumigraph.instruments.parameters import MagnificationRange, Parameter, changes
 from lumigraph.instruments.part import CameraTable
-from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.problems import readable
 from lumigraph.instruments.quantities import FROM_FILE
 from lumigraph.operators.sampling.sampling_rules import SamplingRules
 from lumigraph.sensor import Sensor
+
+if TYPE_CHECKING:
+    from lumigraph.instruments.point_view import PointImage
 
 
 class Instrument(CameraTable):
@@ -113,7 +115,7 @@ class Instrument(CameraTable):
         """Useful range of depths to either side of the focused plane [m]."""
         raise NotImplementedError
 
-    def point_view(self, dz: float = 0.0) -> PointImage:
+    def point_view(self, dz: float = 0.0) -> "PointImage":
         """Image of a point on the axis at a depth `dz` [m] from the focused plane, in some seconds.
 
         Raises

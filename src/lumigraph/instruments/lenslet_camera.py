@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -16,28 +16,30 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.linear import Linear
-from lumigraph.depth import metric
-from lumigraph.design import plenoptic1, plenoptic2, resolution
+from lumigraph.design import plenoptic1, resolution
 from lumigraph.design.layout import LensletLayout
+from lumigraph.design.matching import Diameters, diameters
 from lumigraph.elements import LensletArray, Scatter, TiltAndBow, Train
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import grids, point_view
+from lumigraph.instruments import grids
 from lumigraph.instruments.built import Built
 from lumigraph.instruments.lenslets import Lenslets
 from lumigraph.instruments.making import Making
 from lumigraph.instruments.parameters import Parameter, optional
-from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.tolerances import Tolerances
 from lumigraph.instruments.with_parts import CameraGradients
-from lumigraph.operators import CameraOptics, Model, is_possible, periodic_operator
+from lumigraph.operators import CameraOptics, Model
 from lumigraph.propagation import Propagate
+
+if TYPE_CHECKING:
+    from lumigraph.instruments.point_view import PointImage
 
 
 class LensletCamera(CameraGradients):
     """A main lens, lenslets and a sensor."""
 
     lenslets: Lenslets
-    matching: Literal["views", "full"] = "views"
+    matching: Literal["views", "full", "touching"] = "views"
     model: Model = "paraxial"
     built: Built = Field(default_factory=Built)
     tolerances: Tolerances = Field(default_factory=dict)
@@ -107,17 +109,21 @@ class LensletCamera(CameraGradients):
         return self.built.scatter(self.lenslets.index)
 
     @property
-    def matched_diameter(self) -> float:
-        """Main-lens diameter that `matching` asks for, before anything was built [m]."""
+    def diameters(self) -> Diameters:
+        """Main-lens diameters by the words of `design.matching`, before anything was built [m]."""
         length, b = self._described_separation, self._described_lenslet_distance
-        if self.matching == "full":
-            return plenoptic2.full_diameter(self.lenslets.pitch, length, b)
-        return plenoptic2.views_diameter(self.lenslets.pitch, self.image_distance, b)
+        return diameters(self.lenslets.pitch, self.image_distance, length, b)
+
+    @property
+    def intended_diameter(self) -> float:
+        """Main-lens diameter that `matching` asks for, before anything was built [m]."""
+        matched, full, touching = self.diameters
+        return {"views": matched, "full": full, "touching": touching}[self.matching]
 
     @property
     def pupil_diameter(self) -> float:
-        """Diameter D of the main lens' stop [m]: as given, or matched to the lenslets."""
-        return self.main_lens.diameter or self.matched_diameter
+        """Diameter D of the main lens' stop [m]: as given, or as `matching` has it."""
+        return self.main_lens.diameter or self.intended_diameter
 
     @property
     def micro_image_pitch(self) -> float:
@@ -200,8 +206,10 @@ class LensletCamera(CameraGradients):
     def _stop(self, diameter: Parameter) -> Parameter:
         return optional(diameter, given=self.main_lens.diameter is not None)
 
-    def point_view(self, dz: float = 0.0) -> PointImage:
+    def point_view(self, dz: float = 0.0) -> "PointImage":
         """Image of a point on the axis at a depth `dz` [m], with as many lenslets as its light reaches."""
+        from lumigraph.instruments import point_view
+
         focal_length, diameter = self.main_lens.focal_length, self.pupil_diameter
         blur = diameter * abs(1 - self.separation * (1 / focal_length - 1 / self.defocused(dz)))
         airy = 2.44 * self.wavelength * self.separation / diameter
@@ -214,6 +222,8 @@ class LensletCamera(CameraGradients):
     def _planes(
         self, optics: CameraOptics, depths: Sequence[float] | None, grid: Grid, making: Making
     ) -> Linear:
+        from lumigraph.operators import periodic_operator
+
         operator = periodic_operator(
             optics, grid, 0.0 if depths is None else depths,
             accuracy=making.accuracy, folder=making.folder, progress=making.progress,
@@ -239,6 +249,8 @@ class LensletCamera(CameraGradients):
 
     def optics(self) -> CameraOptics:
         """Plain values of the camera, which operators read."""
+        from lumigraph.operators import is_possible
+
         surface = self.lenslets.surface(self.wavelength)
         plain = replace(super().optics(), model=self.model, lean=self.lean, surface=surface)
         if self.lean is not None and self.model != "paraxial":
@@ -380,6 +392,8 @@ class LensletCamera(CameraGradients):
         source
             These views, or the calibration.
         """
+        from lumigraph.depth import metric
+
         pupil = self.exit_pupil
         f, scale = pupil.magnification * pupil.focal_length, pupil.magnification**2
         seen = metric(

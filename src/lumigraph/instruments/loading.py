@@ -2,22 +2,20 @@
 
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lumigraph.instruments import files
-from lumigraph.instruments.instrument import Instrument
-from lumigraph.instruments.microscope import LightFieldMicroscope
-from lumigraph.instruments.plenoptic1 import PlenopticCamera
-from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
-from lumigraph.instruments.single_lens import SingleLensCamera
 
-_CLASSES: tuple[type[Instrument], ...] = (
-    SingleLensCamera, PlenopticCamera, FocusedPlenopticCamera, LightFieldMicroscope
-)  # fmt: skip
+if TYPE_CHECKING:
+    from lumigraph.instruments.microscope import LightFieldMicroscope
+    from lumigraph.instruments.plenoptic1 import PlenopticCamera
+    from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
+    from lumigraph.instruments.single_lens import SingleLensCamera
 
-AnyCamera = SingleLensCamera | PlenopticCamera | FocusedPlenopticCamera | LightFieldMicroscope
+    AnyCamera = SingleLensCamera | PlenopticCamera | FocusedPlenopticCamera | LightFieldMicroscope
 
 
-def load_camera(path: str | PathLike[str]) -> AnyCamera:
+def load_camera(path: str | PathLike[str]) -> "AnyCamera":
     """The camera that a TOML file describes, or one of the catalogue by its name.
 
     Parameters
@@ -43,8 +41,27 @@ def load_camera(path: str | PathLike[str]) -> AnyCamera:
     return camera_of(files.read(path), name)
 
 
-def camera_of(table: dict, origin: str) -> AnyCamera:
+def camera_of(table: dict, origin: str) -> "AnyCamera":
     """The camera of a table; errors name its `origin`."""
-    kind = files.kind(table, origin)
-    camera_class = next(each for each in _CLASSES if kind == each.KIND)
-    return camera_class.from_table(table, origin)  # type: ignore[return-value]
+    return _class_of(files.kind(table, origin)).from_table(table, origin)
+
+
+def _class_of(kind: str) -> "type[AnyCamera]":
+    """Class of one of `files.KINDS`; the others are not imported, since pydantic takes long to build each."""
+    match kind:
+        case "single-lens":
+            from lumigraph.instruments.single_lens import SingleLensCamera
+
+            return SingleLensCamera
+        case "plenoptic":
+            from lumigraph.instruments.plenoptic1 import PlenopticCamera
+
+            return PlenopticCamera
+        case "focused-plenoptic":
+            from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
+
+            return FocusedPlenopticCamera
+        case _:
+            from lumigraph.instruments.microscope import LightFieldMicroscope
+
+            return LightFieldMicroscope

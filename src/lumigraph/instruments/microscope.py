@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from os import PathLike
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -14,16 +14,11 @@ from lumigraph.core.progress import Progress
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import microscope_design
 from lumigraph.instruments.parameters import MagnificationRange, Parameter
-from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.scope_with_parts import MicroscopeGradients
-from lumigraph.operators.lenslets.points import OUTSIDE
-from lumigraph.operators.microscope.building import SampledLenslets, microscope_operator, require_accuracy
-from lumigraph.operators.microscope.cell import CellSampling
-from lumigraph.operators.microscope.fourier_microscope import fourier_operator
-from lumigraph.operators.microscope.layout import SensorLayout, cell_sampling, laid_out
-from lumigraph.operators.microscope.pixels import narrowed
-from lumigraph.operators.microscope.pupil import PupilImages
-from lumigraph.simulation.microscope_scene import SAMPLES, point_image
+from lumigraph.operators import microscope as operators
+
+if TYPE_CHECKING:
+    from lumigraph.instruments.point_view import PointImage
 
 MODELLED = 1e-2
 """Accuracy of the model of a real camera: that of the light of 10 000 photons in a pixel."""
@@ -121,12 +116,12 @@ class LightFieldMicroscope(MicroscopeGradients):
         """
         planes = None if depths is None else _numbers(depths)
         if self.configuration == "fourier":
-            return fourier_operator(self.objectives, self._mosaic(), planes)
+            return operators.fourier_operator(self.objectives, self._mosaic(), planes)
         samples = (
             5 if samples_per_lenslet is None else checks.whole("samples_per_lenslet", samples_per_lenslet)
         )
         layout = self._layout(samples, pixels, planes or (0.0,), accuracy)
-        return microscope_operator(
+        return operators.microscope_operator(
             self.objectives, self.lenslet, layout, planes,
             accuracy=accuracy, folder=folder, progress=progress,
         )  # fmt: skip
@@ -153,7 +148,7 @@ class LightFieldMicroscope(MicroscopeGradients):
         """A tenth of a millimetre [m]."""
         return 1e-4
 
-    def point_view(self, dz: float = 0.0) -> PointImage:
+    def point_view(self, dz: float = 0.0) -> "PointImage":
         """Image of a point on the axis at a depth `dz` [m], by the scalar model and one wavelength."""
         return microscope_design.point_view(self, checks.finite("dz", dz))
 
@@ -180,6 +175,9 @@ class LightFieldMicroscope(MicroscopeGradients):
 
     def imaged_point(self, y: float, x: float, dz: float, accuracy: float) -> tuple[np.ndarray, float]:
         """Image as of `point_image`, with the estimated relative rms error."""
+        from lumigraph.operators.lenslets.points import OUTSIDE
+        from lumigraph.simulation.microscope_scene import SAMPLES, point_image
+
         y, x, dz = (checks.finite(name, at) for name, at in zip(("y", "x", "dz"), (y, x, dz), strict=True))
         if self.configuration == "fourier":
             return self._fourier_point(y, x, dz), math.nan
@@ -205,7 +203,7 @@ class LightFieldMicroscope(MicroscopeGradients):
         accuracy: float = 1e-2,
         pixels: int | Calibration | None = None,
         double: bool = False,
-    ) -> PupilImages:
+    ) -> "operators.PupilImages":
         """Images of points as functions of Zernike terms of the pupil, with derivatives by them.
 
         Parameters
@@ -224,48 +222,52 @@ class LightFieldMicroscope(MicroscopeGradients):
         GeometryError
             A Fourier microscope, rays, a term that is no Noll index.
         """
+        from lumigraph.simulation.microscope_scene import SAMPLES
+
         if self.configuration == "fourier":
             raise GeometryError(
                 "derivatives by the pupil's phase need configuration '1.0' or '2.0', not 'fourier'."
             )
         depths = checks.finite("farthest", farthest), -farthest  # one side is seen more finely
         layout = self._layout(SAMPLES, pixels, depths, accuracy)
-        return PupilImages(self.objectives, self.lenslet, layout, tuple(terms), accuracy, double)
+        return operators.PupilImages(self.objectives, self.lenslet, layout, tuple(terms), accuracy, double)
 
     def _layout(
         self, samples: int, pixels: int | Calibration | None, depths: Sequence[float], accuracy: float
-    ) -> SampledLenslets:
-        require_accuracy(accuracy)
+    ) -> "operators.SampledLenslets":
+        operators.require_accuracy(accuracy)
         if isinstance(pixels, int) and not isinstance(pixels, bool):
             if pixels < 2:
                 raise GeometryError(f"pixels is {pixels} but a lenslet needs at least 2 along each side.")
-            return SampledLenslets(self.lenslets.count, self._sampled(samples, pixels, 1 / pixels, 0))
+            return operators.SampledLenslets(
+                self.lenslets.count, self._sampled(samples, pixels, 1 / pixels, 0)
+            )
         calibration = self.calibration if pixels is None else pixels
         if not isinstance(calibration, Calibration):
             raise GeometryError(f"pixels is {pixels!r} but must be a whole number, a Calibration or None.")
         sampling = self._sampling(samples, calibration, tuple(depths), accuracy)
-        return laid_out(sampling, calibration, self.lenslet_size)
+        return operators.laid_out(sampling, calibration, self.lenslet_size)
 
     def _sampling(
         self, samples: int, calibration: Calibration, depths: tuple[float, ...], accuracy: float
-    ) -> CellSampling:
+    ) -> "operators.CellSampling":
         fill, pitch = self.pixels.fill_factor, calibration.lattice.pitch
         if self.objective.model == "rays":
             N = math.ceil(max(FINER, math.sqrt(2) / fill) * pitch)
             return self._sampled(samples, N, 1 / pitch, 1)
         shortest = min(self.objectives, key=lambda one: one.wavelength)
-        behind = SensorLayout(calibration, fill)
-        return cell_sampling(shortest, self.lenslet, behind, samples, depths, accuracy)
+        behind = operators.SensorLayout(calibration, fill)
+        return operators.cell_sampling(shortest, self.lenslet, behind, samples, depths, accuracy)
 
-    def _sampled(self, samples: int, N: int, apart: float, degree: int) -> CellSampling:
+    def _sampled(self, samples: int, N: int, apart: float, degree: int) -> "operators.CellSampling":
         """Sampling by N samples along a lenslet, for pixels that stand so far apart [lenslets]."""
         fill = self.pixels.fill_factor
-        width = narrowed(fill * apart, N) if degree == 1 else fill * apart
-        return CellSampling(samples, N, width, degree, fill**2)
+        width = operators.narrowed(fill * apart, N) if degree == 1 else fill * apart
+        return operators.CellSampling(samples, N, width, degree, fill**2)
 
     def check_accuracy(self, accuracy: float) -> None:
         """Refuse an accuracy that `operator` cannot reach, before any work."""
-        require_accuracy(accuracy)
+        operators.require_accuracy(accuracy)
 
     def magnifications(self) -> MagnificationRange:
         """Magnifications of the objective."""

@@ -1,17 +1,22 @@
 """Designer of a light-field microscope: its sliders, and the image of a point."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from lumigraph.instruments.described_microscope import DescribedMicroscope
 from lumigraph.instruments.parameters import Parameter, length, lenslets, magnified, number, pixel, wavelength
-from lumigraph.instruments.point_view import PointImage, of_operator
+
+if TYPE_CHECKING:
+    from lumigraph.instruments.point_view import PointImage
 
 VIEW_PIXELS = 15
 """Along a lenslet, of a point's quick view."""
 
 
-def point_view(scope: DescribedMicroscope, dz: float) -> PointImage:
+def point_view(scope: DescribedMicroscope, dz: float) -> "PointImage":
     """Image of a point on the axis, by few lenslets, the scalar model and one wavelength."""
+    from lumigraph.instruments.point_view import of_operator
+
     if scope.configuration == "fourier":
         whole = scope.replace(sensor={"shape": None})
         return of_operator(whole.operator((dz,)), scope.pixels.pixel_pitch)

@@ -1,7 +1,7 @@
 """The plenoptic camera 1.0."""
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import model_validator
 
@@ -9,11 +9,11 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
 from lumigraph.design import plenoptic1, thin_lens
 from lumigraph.errors import GeometryError
-from lumigraph.instruments import camera_pupil
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.parameters import Parameter, lenslets
-from lumigraph.operators.microscope.pupil import PupilImages
-from lumigraph.simulation import plane_views
+
+if TYPE_CHECKING:
+    from lumigraph.operators.microscope.pupil import PupilImages
 
 _MOST_KNOWN = 33
 """Lenslets along each side of the camera that known planes are simulated with."""
@@ -35,7 +35,7 @@ class PlenopticCamera(LensletCamera):
     sensor
         `Pixels`; without a shape all micro-images fit.
     matching
-        "views" or "full", which are the same here.
+        "views" or "full", which are the same here, or "touching": see `design.matching`.
     model
         "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration, or
         lenslets of glass, and Rayleigh and Sommerfeld's integral, for square lenslets of one focal length;
@@ -99,6 +99,8 @@ class PlenopticCamera(LensletCamera):
 
     def plane_views(self, alpha: float) -> LightField:
         """Views of a textured plane at a refocus factor, by wave optics and a part of the lenslets."""
+        from lumigraph.simulation import plane_views
+
         fewer = self.lenslets.amid([min(n, _MOST_KNOWN) for n in self.lenslets.count])
         small = self.replace(lenslets=fewer, sensor={"shape": None})
         focal_length, behind = self.main_lens.focal_length, self.exit_pupil.behind
@@ -117,7 +119,7 @@ class PlenopticCamera(LensletCamera):
         dz: float = 0.0,
         accuracy: float = 1e-2,
         pixels: Calibration | None = None,
-    ) -> PupilImages:
+    ) -> "PupilImages":
         """Images of points in a plane as functions of Zernike terms of the main lens, with derivatives.
 
         Points stand at (y, x, 0) in that plane, and shine as samples as large as a lenslet there. Lenslets go
@@ -140,6 +142,8 @@ class PlenopticCamera(LensletCamera):
             Lenslets that are not square, alike and in rows and columns along the sensor's; a main lens that
             changes over the field; the exact model; a term that is no Noll index.
         """
+        from lumigraph.instruments import camera_pupil
+
         return camera_pupil.pupil_images(self, terms, dz, accuracy, pixels)
 
     def _own_parameters(self) -> tuple[Parameter, ...]:

@@ -27,8 +27,9 @@ class FocusedPlenopticCamera(LensletCamera):
     sensor
         `Pixels`; without a shape all micro-images fit.
     matching
-        "views": D = z2 p / b, with which 1/m lenslets per axis image a point; "full": D = p L / b, with which
-        micro-images are as wide as the lenslets.
+        Diameter of the main lens, by `design.matching`. "views": f-numbers matched, D = z2 p / b, with which
+        1/m lenslets per axis image a point; "full": D = p L / b, micro-images as wide as the lenslets;
+        "touching": D = p (L + b) / b, micro-images as wide as their distance.
     model
         "paraxial": parabolic lenses and Fresnel's distances; "exact": lenses free of spherical aberration, or
         lenslets of glass, and Rayleigh and Sommerfeld's integral, for square lenslets of one focal length;
@@ -171,7 +172,7 @@ class FocusedPlenopticCamera(LensletCamera):
         ends, kind = ((0.05, 2.0), "log") if m > 0 else ((-0.95, -0.05), "linear")
         return (
             number("lenslets.magnification", "Lenslet magnification m", m, ends, kind=kind),
-            choice("matching", "Diameter matched for", self.matching, ("views", "full")),
+            choice("matching", "Diameter matched for", self.matching, ("views", "full", "touching")),
             *lenslets(self.lenslets, layouts=len(self.lenslets.focal_length) == 1),
         )
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -12,14 +12,10 @@ from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.described_microscope import DescribedMicroscope
 from lumigraph.instruments.sees_volumes import VolumeGradients
-from lumigraph.operators.lenslets.whole_planes import WholePlane
-from lumigraph.operators.microscope.building import require_accuracy
-from lumigraph.operators.microscope.fourier_plane import FourierPlane
-from lumigraph.operators.microscope.fourier_points import FourierPoints
-from lumigraph.operators.microscope.layout import SensorLayout, interpolated, laid_out
-from lumigraph.operators.microscope.pupil import PupilImages, require_phase
-from lumigraph.operators.microscope.pupil_plane import PupilPlane
-from lumigraph.simulation.microscope_scene import SAMPLES
+from lumigraph.operators import microscope as operators
+
+if TYPE_CHECKING:
+    from lumigraph.operators.lenslets.whole_planes import WholePlane
 
 RESOLVED = 0.21
 """Distance of points that hold all that an objective resolves, over λ/NA: 1.2 times closer than λ/(4 NA), so
@@ -34,11 +30,11 @@ class MicroscopeGradients(VolumeGradients, DescribedMicroscope):
         self,
         pairs: Sequence[tuple[Self, Self]],
         farthest: float,
-        points: int = SAMPLES,
+        points: int | None = None,
         *,
         accuracy: float = 1e-2,
         double: bool = False,
-    ) -> tuple[PupilImages, list[tuple[PupilImages, PupilImages]]]:
+    ) -> "tuple[operators.PupilImages, list[tuple[operators.PupilImages, operators.PupilImages]]]":
         """Pupil images without terms, and those of pairs of slightly changed microscopes, sampled alike.
 
         By pixels that may stand anywhere, so that they may move; those of the pairs in double precision.
@@ -50,7 +46,7 @@ class MicroscopeGradients(VolumeGradients, DescribedMicroscope):
         farthest
             Largest distance of the points from the focused plane [m].
         points
-            Along a lenslet, whose light is 1.
+            Along a lenslet, whose light is 1; None for as many as `point_image` has.
         accuracy, double
             As of `pupil_images`.
 
@@ -59,13 +55,14 @@ class MicroscopeGradients(VolumeGradients, DescribedMicroscope):
         GeometryError
             As of `pupil_images`.
         """
-        own = self._alike(None, (farthest, points), require_accuracy(accuracy))
-        ends = [
-            tuple(end._alike((self, own), (farthest, points), accuracy) for end in pair) for pair in pairs
-        ]
+        from lumigraph.simulation.microscope_scene import SAMPLES
+
+        sampled = farthest, SAMPLES if points is None else points
+        own = self._alike(None, sampled, operators.require_accuracy(accuracy))
+        ends = [tuple(end._alike((self, own), sampled, accuracy) for end in pair) for pair in pairs]
         return replace(own, double=double), [(low, high) for low, high in ends]
 
-    def fourier_points(self) -> FourierPoints:
+    def fourier_points(self) -> "operators.FourierPoints":
         """Images of points anywhere by a Fourier microscope, with derivatives by their position.
 
         Raises
@@ -75,24 +72,24 @@ class MicroscopeGradients(VolumeGradients, DescribedMicroscope):
         """
         if self.configuration != "fourier":
             raise GeometryError(f"fourier_points needs configuration 'fourier', not {self.configuration!r}.")
-        return FourierPoints(self.objectives, self._mosaic())
+        return operators.FourierPoints(self.objectives, self._mosaic())
 
     def _alike(
-        self, like: tuple[Self, PupilImages] | None, told: tuple[float, int], accuracy: float
-    ) -> PupilImages:
+        self, like: "tuple[Self, operators.PupilImages] | None", told: tuple[float, int], accuracy: float
+    ) -> "operators.PupilImages":
         if self.in_pupil:
             raise GeometryError(
                 "images of points by the pupil are of configuration '1.0' or '2.0', not 'fourier'."
             )
-        require_phase(self.objectives)
+        operators.require_phase(self.objectives)
         (far, points), N = told, None if like is None else like[1].layout.sampling.pixels
         shortest = min(self.objectives, key=lambda one: one.wavelength)
-        pixels = SensorLayout(self.calibration, self.pixels.fill_factor)
-        sampling = interpolated(shortest, self.lenslet, pixels, points, (far, -far), accuracy, N)
-        layout = laid_out(sampling, self.calibration, self.lenslet_size, np.float64)
+        pixels = operators.SensorLayout(self.calibration, self.pixels.fill_factor)
+        sampling = operators.interpolated(shortest, self.lenslet, pixels, points, (far, -far), accuracy, N)
+        layout = operators.laid_out(sampling, self.calibration, self.lenslet_size, np.float64)
         if like is not None and self.calibration.lattice == like[0].calibration.lattice:
             layout = replace(layout, placement=like[1].layout.placement)
-        return PupilImages(self.objectives, self.lenslet, layout, (), accuracy, like is not None)
+        return operators.PupilImages(self.objectives, self.lenslet, layout, (), accuracy, like is not None)
 
     def part_plane(
         self,
@@ -101,7 +98,7 @@ class MicroscopeGradients(VolumeGradients, DescribedMicroscope):
         dz: float = 0.0,
         *,
         accuracy: float = 1e-2,
-    ) -> WholePlane:
+    ) -> "WholePlane":
         """Raw images of a plane, with derivatives by any difference between pairs of nearby microscopes.
 
         The object stays where it is before all microscopes, along the lenslets' rows and columns, and as
@@ -141,9 +138,9 @@ class MicroscopeGradients(VolumeGradients, DescribedMicroscope):
         wanted, depth = grid or self.object_grid, checks.finite("dz", dz)
         if self.in_pupil:
             points = [(low.fourier_points(), high.fourier_points()) for low, high in pairs]
-            return FourierPlane(self.fourier_points(), points, wanted, depth)
+            return operators.FourierPlane(self.fourier_points(), points, wanted, depth)
         shortest = min(self.objectives, key=lambda one: one.wavelength)
         finest = RESOLVED * shortest.wavelength / shortest.aperture
         points = math.ceil(self.lenslet_size / max(finest, min(wanted.pitch)) * (1 - 1e-9))
         own, ends = self.images_alike(pairs, abs(depth), points, accuracy=accuracy)
-        return PupilPlane(own, ends, wanted, depth)
+        return operators.PupilPlane(own, ends, wanted, depth)

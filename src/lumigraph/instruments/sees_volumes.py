@@ -2,12 +2,14 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
-from lumigraph.operators.lenslets.part_volume import PartVolume
-from lumigraph.operators.lenslets.whole_planes import PlaneImages
+
+if TYPE_CHECKING:
+    from lumigraph.operators.lenslets.part_volume import PartVolume
+    from lumigraph.operators.lenslets.whole_planes import PlaneImages
 
 
 class VolumeGradients:
@@ -21,7 +23,7 @@ class VolumeGradients:
         dz: float = 0.0,
         *,
         accuracy: float = 1e-2,
-    ) -> PlaneImages:
+    ) -> "PlaneImages":
         """Raw images of a plane, with derivatives by any difference between pairs of nearby instruments."""
 
     def part_volume(
@@ -31,7 +33,7 @@ class VolumeGradients:
         depths: Sequence[float],
         *,
         accuracy: float = 1e-2,
-    ) -> PartVolume:
+    ) -> "PartVolume":
         """Raw images of transparent planes that shine together: the sum of those of `part_plane`.
 
         Parameters
@@ -60,6 +62,8 @@ class VolumeGradients:
         >>> volume.shape
         ((61, 61), (2, 20, 20))
         """
+        from lumigraph.operators.lenslets.part_volume import PartVolume
+
         if not len(depths):
             raise GeometryError("depths are empty. Give at least one, such as [0.0].")
         planes = (self.part_plane(pairs, grid, float(dz), accuracy=accuracy) for dz in depths)

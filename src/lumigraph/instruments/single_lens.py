@@ -18,8 +18,7 @@ from lumigraph.instruments import grids
 from lumigraph.instruments.angular import refuse_angles
 from lumigraph.instruments.making import Making
 from lumigraph.instruments.with_parts import CameraGradients
-from lumigraph.operators import CameraOptics, single_lens_operator
-from lumigraph.operators.single_lens import FINEST
+from lumigraph.operators import CameraOptics
 from lumigraph.propagation import Propagate
 
 
@@ -116,6 +115,8 @@ class SingleLensCamera(CameraGradients):
     def _planes(
         self, optics: CameraOptics, depths: Sequence[float] | None, grid: Grid, making: Making
     ) -> Linear:
+        from lumigraph.operators.single_lens import FINEST, single_lens_operator
+
         if not 1e-2 >= checks.finite("accuracy", making.accuracy, "1", SamplingError) >= FINEST:
             raise SamplingError(
                 f"accuracy is {making.accuracy:g} but a single lens is imaged to {FINEST:g}, relative rms. "

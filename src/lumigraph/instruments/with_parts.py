@@ -1,15 +1,16 @@
 """Cameras whose images have derivatives by any difference between two nearby cameras."""
 
 from collections.abc import Sequence
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from lumigraph.core.grid import Grid
 from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.sees_volumes import VolumeGradients
-from lumigraph.operators.lenslets.part_leaning import TiltedImages, by_parts
-from lumigraph.operators.lenslets.plane_of_points import plane_before
-from lumigraph.operators.lenslets.point_images import PointImages
-from lumigraph.operators.lenslets.whole_planes import WholePlane
+
+if TYPE_CHECKING:
+    from lumigraph.operators.lenslets.point_images import PointImages
+    from lumigraph.operators.lenslets.part_leaning import TiltedImages
+    from lumigraph.operators.lenslets.whole_planes import WholePlane
 
 
 class CameraGradients(VolumeGradients, Camera):
@@ -17,7 +18,7 @@ class CameraGradients(VolumeGradients, Camera):
 
     def part_images(
         self, pairs: Sequence[tuple[Self, Self]], *, accuracy: float = 1e-2
-    ) -> PointImages | TiltedImages[PointImages]:
+    ) -> "PointImages | TiltedImages[PointImages]":
         """Images of points, with derivatives by any difference between pairs of nearby cameras.
 
         Parameters
@@ -52,6 +53,8 @@ class CameraGradients(VolumeGradients, Camera):
         >>> images.gradient(point, images.forward(point)).shape
         (1,)
         """
+        from lumigraph.operators.lenslets.part_leaning import by_parts
+
         return by_parts(self, pairs, accuracy)
 
     def part_plane(
@@ -61,7 +64,7 @@ class CameraGradients(VolumeGradients, Camera):
         dz: float = 0.0,
         *,
         accuracy: float = 1e-2,
-    ) -> WholePlane | TiltedImages[WholePlane]:
+    ) -> "WholePlane | TiltedImages[WholePlane]":
         """Raw images of a plane, with derivatives by any difference between pairs of nearby cameras.
 
         The object stays where it is before all cameras, and as bright for each area: how it falls onto their
@@ -102,11 +105,14 @@ class CameraGradients(VolumeGradients, Camera):
         >>> plane.gradient(np.ones((20, 20)), raw).shape
         (1,)
         """
+        from lumigraph.operators.lenslets.part_leaning import TiltedImages
+        from lumigraph.operators.lenslets.plane_of_points import plane_before
+
         self.defocused(float(dz))
         images = self.part_images(pairs, accuracy=accuracy)
         wanted = grid or self.operator_grid()
 
-        def plane(one: PointImages) -> WholePlane:
+        def plane(one: "PointImages") -> "WholePlane":
             return plane_before(one, wanted, float(dz))
 
         return images.each(plane) if isinstance(images, TiltedImages) else plane(images)

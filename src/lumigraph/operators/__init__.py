@@ -11,18 +11,7 @@ Storeys, from the lowest; each imports only from those before it, the last two n
 - `microscope`: volumes before light-field and Fourier light-field microscopes
 """
 
-from lumigraph.operators.lenslets.paraxial_error import is_possible
-from lumigraph.operators.periodic.incoherent import PeriodicOperator, periodic_operator
-from lumigraph.operators.sampling.camera import CameraOptics, HasOptics, Model
-from lumigraph.operators.single_lens import SingleLensOperator, single_lens_operator
+import lazy_loader
 
-__all__ = [
-    "CameraOptics",
-    "HasOptics",
-    "Model",
-    "PeriodicOperator",
-    "SingleLensOperator",
-    "is_possible",
-    "periodic_operator",
-    "single_lens_operator",
-]
+# Names load when they are first used: a description needs no operator, and no other kind of camera.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -15,13 +15,10 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import scipy.fft
+import scipy
 
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
-
-_fft: Any = scipy.fft.fft  # one thread each: the blocks run side by side
-_ifft: Any = scipy.fft.ifft
 
 BLOCK_BYTES = 1 << 21
 """Size of one block of rows: it stays in the second-level cache of one processor."""
@@ -150,24 +147,24 @@ def _blocked(data: np.ndarray, transfer: Transfer, out: np.ndarray) -> None:
     spectrum = np.empty((columns.count, max(bottom - top, out.shape[0])), data.dtype)
 
     def forward(start: int, stop: int) -> None:
-        line = _fft(data[top + start : top + stop], columns.n)
+        line: Any = scipy.fft.fft(data[top + start : top + stop], columns.n)
         for here, of in zip(columns.parts, columns.packed, strict=True):
             spectrum[of, start:stop] = line[:, here].T
 
     def across(start: int, stop: int) -> None:
         work = np.zeros((stop - start, rows.n), data.dtype)
         work[:, top:bottom] = spectrum[start:stop, : bottom - top]
-        work = _fft(work, overwrite_x=True)
+        work: Any = scipy.fft.fft(work, overwrite_x=True)
         line = np.zeros((stop - start, fewer_rows.n), data.dtype)
         for here, there, of in zip(rows.parts, fewer_rows.parts, rows.packed, strict=True):
             np.multiply(work[:, here], H[start:stop, of], out=line[:, there])
-        spectrum[start:stop, : out.shape[0]] = _ifft(line, overwrite_x=True)[:, kept_rows]
+        spectrum[start:stop, : out.shape[0]] = scipy.fft.ifft(line, overwrite_x=True)[:, kept_rows]
 
     def back(start: int, stop: int) -> None:
         line = np.zeros((stop - start, fewer_columns.n), data.dtype)
         for there, of in zip(fewer_columns.parts, columns.packed, strict=True):
             line[:, there] = spectrum[of, start:stop].T
-        line = _ifft(line, overwrite_x=True)[:, kept_columns]
+        line = scipy.fft.ifft(line, overwrite_x=True)[:, kept_columns]
         out[start:stop] = line if np.iscomplexobj(out) else arrays.intensity(line)
 
     _in_blocks(forward, bottom - top, columns.n * data.itemsize)

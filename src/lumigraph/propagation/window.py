@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-import scipy.fft
+import scipy
 
 from lumigraph.core import memory
 from lumigraph.core.grid import Grid

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from lumigraph.core import checks
 from lumigraph.errors import GeometryError
@@ -71,7 +71,7 @@ class AngularResponse:
         angle = np.abs(np.asarray(angle, float))
         response = np.cos(np.minimum(angle, math.pi / 2)) ** self.power
         if self.angles:
-            response = response * PchipInterpolator(self.angles, self.values)(
+            response = response * scipy.interpolate.PchipInterpolator(self.angles, self.values)(
                 np.minimum(angle, self.angles[-1])
             )
         return response

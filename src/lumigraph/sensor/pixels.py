@@ -1,7 +1,7 @@
 """Intensity on a grid integrated over the areas of pixels of any pitch."""
 
 import numpy as np
-import scipy.fft
+import scipy
 
 from lumigraph.core import checks
 from lumigraph.core.arrays import WORKERS, Array, like, namespace, placement

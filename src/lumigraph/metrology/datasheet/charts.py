@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lumigraph import io, store
 from lumigraph.core import checks
@@ -14,9 +14,12 @@ from lumigraph.core.raw import RawImage
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments import Instrument, LensletCamera
 from lumigraph.instruments.files import read as read_table
-from lumigraph.instruments.loading import AnyCamera, load_camera
+from lumigraph.instruments.loading import load_camera
 from lumigraph.metrology.datasheet.exposures import FileExposures
 from lumigraph.units import parse
+
+if TYPE_CHECKING:
+    from lumigraph.instruments.loading import AnyCamera
 
 FILE = "charts.toml"
 """Names the pictures of a folder."""
@@ -101,7 +104,7 @@ class Charts:
             yield from ((f"board-{k}", one.boards), (f"texture-{k}", one.textures))
 
 
-def check_camera(camera: AnyCamera | LensletCamera | Instrument) -> LensletCamera:
+def check_camera(camera: "AnyCamera | LensletCamera | Instrument") -> LensletCamera:
     """The camera, refused unless it is a plenoptic one."""
     if not isinstance(camera, LensletCamera):
         raise GeometryError(

@@ -87,7 +87,7 @@ def one_by_one(cameras: Sequence[CameraOptics]) -> list[CameraOptics]:
 
 
 def _names(scatter: Scatter, lenslets: dict[tuple[int, int], bool]) -> bool:
-    """Whether a scatter names these lenslets in order, and says where those stand that are marked."""
+    """True if a scatter names these lenslets in order, with the places of the marked ones."""
     own = [(one.index, one.aside is not None) for one in scatter.own]
     return own == sorted(lenslets.items())
 
@@ -260,7 +260,7 @@ class IndividualLenslets(SquareLenslets):
 
     @cached_property
     def _own(self) -> dict[int, tuple[Any, ...]]:
-        """What is given of single lenslets, by their row on the lattice."""
+        """Given values of single lenslets, by their row on the lattice."""
         found: dict[int, tuple[Any, ...]] = {}
         for one in self._scatter.own:
             found[one.index[0]] = (*found.get(one.index[0], ()), one)

@@ -292,5 +292,5 @@ def _require_as_thin(camera: CameraOptics, other: CameraOptics) -> None:
 
 
 def one_lens(camera: CameraOptics) -> bool:
-    """Whether points of all fields are seen through the same thin lens."""
+    """True if points of all fields are seen through the same thin lens."""
     return camera.objects is None and field_lenses.plate_of(camera) is None

@@ -57,7 +57,7 @@ def _round(lens: Train) -> ThinLens | None:
 def paraxial_light(
     camera: CameraOptics, distance: float, widest: float, samples: int = PUPIL
 ) -> "RoundPupilLight | SampledPupilLight":
-    """As `point_light` of a paraxial camera; so many samples across the lens, at least."""
+    """Light of a point behind a paraxial lens, with at least so many samples across it."""
     lens = _cells.lens(camera)
     if (first := _round(lens)) is not None:
         half, squared = camera.pupil_diameter / 2, camera.wavelength * camera.separation

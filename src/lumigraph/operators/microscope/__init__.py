@@ -12,3 +12,8 @@
 - `fourier_microscope`: Fourier light-field microscopes; `fourier_points`, `fourier_plane`, points and planes
   with derivatives, by `fourier_changes`
 """
+
+import lazy_loader
+
+# Names load when they are first used: a description needs no operator, and no other kind of camera.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

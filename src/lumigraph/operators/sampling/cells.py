@@ -203,7 +203,7 @@ def cells_of(
 
 
 def placed_cells(camera: CameraOptics, array: LensletArray) -> Cells:
-    """Those cells, sampled as coarsely as can be."""
+    """The same cells, sampled as coarsely as possible."""
     lattice = array.lattice
     if lattice.layout == "hex":
         size = (math.sqrt(3) * lattice.pitch, lattice.pitch * lattice.kinds)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
 import numpy as np
@@ -10,8 +10,10 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments import Instrument, LensletCamera, Tolerance
-from lumigraph.instruments.loading import AnyCamera
 from lumigraph.instruments.tolerances import EACH, MISSING, TILT, check_name
+
+if TYPE_CHECKING:
+    from lumigraph.instruments.loading import AnyCamera
 
 SEED = "built.seed"
 """Error that says which lenslet is how."""
@@ -26,7 +28,7 @@ _SCATTERS = {
 """Keys of ``[built]`` by the error that differs from lenslet to lenslet."""
 
 
-def check_camera(camera: AnyCamera | LensletCamera | Instrument) -> LensletCamera:
+def check_camera(camera: "AnyCamera | LensletCamera | Instrument") -> LensletCamera:
     """The camera, if its manufacturing errors are known.
 
     Raises

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lumigraph.design import plenoptic2
+from lumigraph.design import matching, plenoptic2
 from lumigraph.plots.curves import curves
 from lumigraph.studies.thesis.figures._lenslet import FOCAL as _FOCAL
 from lumigraph.studies.thesis.figures._lenslet import IMAGE as _IMAGE
@@ -23,9 +23,8 @@ def run(context: Context) -> ExperimentOutcome:
     magnifications = np.linspace(0.1, 0.5, 41)
     b = np.array([plenoptic2.lenslet_distance(_FOCAL, m) for m in magnifications])
     a = np.array([plenoptic2.relay_distance(_FOCAL, m) for m in magnifications])
-    views = np.array([plenoptic2.views_diameter(_PITCH, _IMAGE, distance) for distance in b])
-    pairs = zip(a, b, strict=True)
-    full = np.array([plenoptic2.full_diameter(_PITCH, _IMAGE + relay, distance) for relay, distance in pairs])
+    wide = [matching.diameters(_PITCH, _IMAGE, _IMAGE + relay, at) for relay, at in zip(a, b, strict=True)]
+    views, full = np.array([each.matched for each in wide]), np.array([each.full for each in wide])
     rows = (
         ResultRow("b, m = 0.5", b[-1] * 1e3, "mm", 7.8, 7.8, 0.001),
         ResultRow("a, m = 0.5", a[-1] * 1e3, "mm", 15.6, 15.6, 0.001),

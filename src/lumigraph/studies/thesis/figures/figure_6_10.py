@@ -40,7 +40,7 @@ def run(context: Context) -> ExperimentOutcome:
     camera = white_images.laboratory_camera(17 if context.quick else 31)
     camera = camera.replace(
         lenslets={"rotation": _TURN, "shape": "square"},
-        main_lens={"diameter": _STOP * white_images.matched_diameter(camera)},
+        main_lens={"diameter": _STOP * camera.diameters.touching},
     )
     context.progress(0.0, "white image")
     white = RawImage(context.cached("white", lambda: white_images.white(camera).data))

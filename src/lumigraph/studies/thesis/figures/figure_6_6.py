@@ -5,7 +5,7 @@ import numpy as np
 from lumigraph.calibration.diagnosis import diagnose
 from lumigraph.core.raw import RawImage
 from lumigraph.plots.curves import images
-from lumigraph.studies.thesis.figures.white_images import laboratory_camera, matched_diameter, white
+from lumigraph.studies.thesis.figures.white_images import laboratory_camera, white
 from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
 
 _CASES = {
@@ -26,12 +26,12 @@ _CASES = {
 def run(context: Context) -> ExperimentOutcome:
     """Simulated white images for four diameters of the main lens."""
     intended = laboratory_camera(9 if context.quick else 31)
-    matched, pitch = matched_diameter(intended), intended.micro_image_pitch
+    touching, pitch = intended.diameters.touching, intended.micro_image_pitch
     rows: list[ResultRow] = []
     panels = []
     for number, (name, (factor, faults)) in enumerate(_CASES.items()):
         context.progress(number / len(_CASES), name)
-        camera = intended.replace(main_lens={"diameter": factor * matched})
+        camera = intended.replace(main_lens={"diameter": factor * touching})
         picture = RawImage(context.cached(name.replace(" ", "-"), lambda c=camera: white(c).data))
         found = diagnose(picture, intended)
         gap = (pitch - camera.micro_image_width) * 1e6
@@ -41,8 +41,8 @@ def run(context: Context) -> ExperimentOutcome:
             ResultRow(f"gap (overlap below 0), {name}", found.gap * 1e6, "µm", None, gap, 2.5),
             ResultRow(f"diameter of the main lens, {name}", found.diameter * 1e3, "mm", None,
                 camera.pupil_diameter * 1e3, 0.05),
-            ResultRow(f"diameter that would match, {name}", found.matching_diameter * 1e3, "mm", None,
-                matched * 1e3, 0.03),
+            ResultRow(f"diameter at which they touch, {name}", found.intended_diameter * 1e3, "mm", None,
+                touching * 1e3, 0.03),
         ]  # fmt: skip
         n, half = picture.shape[0] // 2, int(3.5 * pitch / intended.sensor.pixel_pitch)
         text = f"{name}: gap {found.gap * 1e6:+.0f} µm"

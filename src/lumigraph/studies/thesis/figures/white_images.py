@@ -39,12 +39,6 @@ class MisplacedCamera(FocusedPlenopticCamera):
         return super().separation + self.lenslet_shift
 
 
-def matched_diameter(found: FocusedPlenopticCamera) -> float:
-    """Main-lens diameter whose micro-images touch: as wide as their pitch, p (L + b)/b [m]."""
-    b = found.lenslet_distance
-    return found.lenslets.pitch * (found.separation + b) / b
-
-
 def laboratory_camera(lenslets: int) -> MisplacedCamera:
     """The laboratory camera at m = 0.5 with everything in its place and micro-images that touch."""
     found = camera(0.5, lenslets)
@@ -52,7 +46,7 @@ def laboratory_camera(lenslets: int) -> MisplacedCamera:
     values["sensor"] = {
         **values["sensor"], "pixel_pitch": PIXEL, "shape": _sensor_shape(found, lenslets)
     }  # fmt: skip
-    values["main_lens"] = {**values["main_lens"], "diameter": matched_diameter(found)}
+    values["main_lens"] = {**values["main_lens"], "diameter": found.diameters.touching}
     return MisplacedCamera(**values)
 
 
