@@ -13,7 +13,7 @@ from importlib.metadata import version
 from typing import get_args
 
 from cyclopts import App
-from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownCommandError
+from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownCommandError, UnknownOptionError
 
 from lumigraph.cli.batch import batch
 from lumigraph.cli.board import board
@@ -31,7 +31,7 @@ from lumigraph.cli.design import design
 from lumigraph.cli.information import information
 from lumigraph.cli.measure import measure
 from lumigraph.cli.optimise import optimise
-from lumigraph.cli.options import COMMAND, PARAMETER, WARNED
+from lumigraph.cli.options import COMMAND, PARAMETER, RENAMED, WARNED
 from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
 from lumigraph.cli.reporting import telling
@@ -145,8 +145,18 @@ def _usage(error: CycloptsError) -> str:
         return _unknown(error.unused_tokens[0])
     verb = " ".join(error.command_chain or ())
     hint = f"lumigraph {verb} --help".replace("  ", " ")
-    text = (_missing(error, verb) if isinstance(error, MissingArgumentError) else str(error)).rstrip(".")
+    text = (_missing(error, verb) if isinstance(error, MissingArgumentError) else _renamed(error)).rstrip(".")
     return f"{text}{'' if text.endswith('?') else '.'} Try '{hint}'."
+
+
+def _renamed(error: CycloptsError) -> str:
+    """Message of an error, with the new name of an option that has another one now."""
+    if not isinstance(error, UnknownOptionError):
+        return str(error)
+    old = (error.token.keyword or error.token.value).partition("=")[0]
+    known = {name for one in error.argument_collection for name in one.names}
+    new = next((name for name in RENAMED.get(old, ()) if name in known), None)
+    return str(error) if new is None else f"{old} is now called {new}. Did you mean {new}?"
 
 
 def _missing(error: MissingArgumentError, verb: str) -> str:
