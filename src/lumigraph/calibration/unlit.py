@@ -6,6 +6,7 @@ from scipy import ndimage
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.raw import RawImage
+from lumigraph.core.saturation import saturation_level
 
 _DARK = 0.1  # of a lit lenslet's light
 _CORE, _SAMPLES = 0.3, 7  # of the pitch around a centre that is looked at, and samples along it at most
@@ -45,11 +46,11 @@ def unlit(picture: np.ndarray, model: Calibration, centers: np.ndarray, *, white
 
 def saturated(image: RawImage, model: Calibration, indices: np.ndarray) -> int:
     """Number of lenslets (k, 2) at the top of a picture's range over half of their middle."""
-    if image.bit_depth is None:
+    if (level := saturation_level(image)) is None:
         return 0
     data = to_numpy(image.data)
     cores = _cores(data if data.ndim == 2 else data.max(-1), model.position(indices), model.lattice.pitch)
-    return int(((cores >= 2**image.bit_depth - 1).mean(-1) > _MOST).sum())
+    return int(((cores >= level).mean(-1) > _MOST).sum())
 
 
 def _cores(picture: np.ndarray, centers: np.ndarray, pitch: float) -> np.ndarray:
