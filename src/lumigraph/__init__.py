@@ -9,7 +9,7 @@ The everyday names, listed in `__init__.pyi`; each is imported when it is first 
 7.8
 """
 
-from lumigraph.core import drawing
+from lumigraph.core import camera_names, drawing, verb_module
 
 __version__ = "0.1.0"
 
@@ -18,18 +18,35 @@ if TYPE_CHECKING:
     from typing import Any
 
 
+_RENAMED = {"view": "sub_aperture", "metric": "metrology"}
+"""Names of earlier versions."""
+
+_found: "dict[str, Any]" = {}
+
+
 def __getattr__(name: str) -> "Any":
     """Read `__init__.pyi` at the first name: until then nothing slow is imported, and Ctrl-C is quiet."""
-    import lazy_loader
+    if name in _RENAMED:
+        raise AttributeError(f"lumigraph.{name} is now called lumigraph.{_RENAMED[name]}.")
+    if not _found:
+        import lazy_loader
 
-    names = ("__getattr__", "__dir__", "__all__")
-    found: dict[str, Any] = dict(zip(names, lazy_loader.attach_stub(__name__, __file__), strict=True))
-    globals().update(found)
-    return found[name] if name in found else found["__getattr__"](name)
+        names = ("__getattr__", "__dir__", "__all__")
+        _found.update(zip(names, lazy_loader.attach_stub(__name__, __file__), strict=True))
+    return _found[name] if name in _found else _found["__getattr__"](name)
 
 
 def __dir__() -> list[str]:
     return __getattr__("__all__")
 
 
+def _verb(module: str, name: str) -> "Any":
+    from importlib import import_module
+
+    return getattr(import_module(f"lumigraph.{module}"), name)
+
+
 drawing.done_by(lambda: __getattr__("plots"))
+camera_names.loaded_by(lambda: _verb("instruments", "load_camera"))
+verb_module.called_by("lumigraph.depth", lambda: _verb("depth.estimate", "estimate"))
+verb_module.called_by("lumigraph.design", lambda: _verb("instruments.loading", "design"))

@@ -1,17 +1,29 @@
 """The everyday names and where they come from; `lazy_loader` reads this file, and so do type checkers."""
 
 from . import (
-    adaptive as adaptive,
     analysis as analysis,
+    calibration as calibration,
     cluster as cluster,
+    deconvolution as deconvolution,
     depth as depth,
     design as design,
-    information as information,
-    metric as metric,
+    elements as elements,
+    instruments as instruments,
+    io as io,
+    metrology as metrology,
+    operators as operators,
     plots as plots,
+    preparation as preparation,
+    propagation as propagation,
+    rendering as rendering,
     samples as samples,
-    tolerance as tolerance,
+    scene as scene,
+    sensor as sensor,
+    simulation as simulation,
+    studies as studies,
+    testing as testing,
     units as units,
+    viewer as viewer,
 )
 from .calibration import calibrate as calibrate, devignette as devignette
 from .core.calibration import Calibration as Calibration
@@ -55,6 +67,12 @@ from .instruments import (
     scan as scan,
 )
 from .io import contents as contents, open as open, save as save
+from .studies import (
+    adaptive as adaptive,
+    information as information,
+    optimisation as optimisation,
+    tolerance as tolerance,
+)
 from .studies.optimisation import Goal as Goal, optimise as optimise
 from .preparation import (
     PreparedImage as PreparedImage,
@@ -78,7 +96,7 @@ from .rendering import (
     refocus as refocus,
     refocus_fourier as refocus_fourier,
     refocus_stack as refocus_stack,
-    view as view,
+    sub_aperture as sub_aperture,
     view_path as view_path,
 )
 from .scene import (
@@ -101,6 +119,6 @@ from .simulation import (
     TiltedWaves as TiltedWaves,
     simulate as simulate,
 )
-from .viewer import view_inline as view_inline
+from .viewer import show as show, view_inline as view_inline
 
 __version__: str

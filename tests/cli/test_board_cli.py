@@ -15,7 +15,7 @@ KNOWN = ["--focal-length", "50 mm", "--pixel-pitch", "5.5 um", "--shape", "3068"
 
 @pytest.fixture
 def table(tmp_path):
-    lg.metric.save_corners(corners(np.random.default_rng(2), frames=4), tmp_path / "corners.csv")
+    lg.metrology.save_corners(corners(np.random.default_rng(2), frames=4), tmp_path / "corners.csv")
     return tmp_path / "corners.csv"
 
 
@@ -26,7 +26,7 @@ def test_a_table_of_corners_gives_a_camera_with_intervals(table, capsys) -> None
     found = json.loads(capsys.readouterr().out)
     low, high = found["lenslet_distance_interval"]
     assert low < 0.42e-3 < high
-    assert lg.metric.load(made).camera.focal_length == found["focal_length"]
+    assert lg.metrology.load(made).camera.focal_length == found["focal_length"]
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ import tifffile
 from scipy.ndimage import gaussian_filter
 
 import lumigraph as lg
-from lumigraph.cli.options import planes
 from lumigraph.cli.frames import Frames, items_of
+from lumigraph.cli.options import planes
 from lumigraph.operators.microscope.volume_operator import MicroscopeOperator
 from lumigraph.preparation import vignetting
 

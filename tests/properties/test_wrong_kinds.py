@@ -117,7 +117,7 @@ MISTAKES = {
         "views is of type ndarray but must be a LightField",
     ),
     "stack of one": (lambda: lg.refocus_stack(VIEWS, 1.1), "alphas is 1.1 but must be a list of numbers"),
-    "view number": (lambda: lg.view(VIEWS, 0.5, 0), "v is 0.5 but must be a whole number"),
+    "view number": (lambda: lg.sub_aperture(VIEWS, 0.5, 0), "v is 0.5 but must be a whole number"),
     "aperture of an array": (
         lambda: lg.reduce_aperture(RAW, 0.5),
         "views is of type ndarray but must be a LightF",

@@ -142,8 +142,8 @@ def board(
     """Measure a plenoptic camera by a board of known size: its lengths, with their uncertainty.
 
     SOURCES are raw images of the board, three or more, in which the corners are found: behind the lenslets
-    of a camera 2.0, or in the views of a camera 1.0 (--in-views, or --camera of such a camera). All of the board
-    must be on each picture, but of ChArUco boards any six corners do. Finding boards needs OpenCV
+    of a camera 2.0, or in the views of a camera 1.0 (--in-views, or --camera of such a camera). All of the
+    board must be on each picture, but of ChArUco boards any six corners do. Finding boards needs OpenCV
     (pip install 'lumigraph[board]'), but for chessboards in views. Or SOURCES are one table (.csv) of where
     lenslets show them, with the columns frame, corner, y, x, center_y, center_x, kind, and in_views of a
     camera 1.0; or one folder of COMPOTE's (bap.csv, centers.csv, camera.json, scene.json), which also says

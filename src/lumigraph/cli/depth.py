@@ -1,6 +1,5 @@
 """`lumigraph depth`."""
 
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
     from lumigraph.instruments import Instrument
 
 MAPS = (".pfm", ".tif", ".tiff", ".png", ".zarr", ".ply")
-_PLANES = "0.9:1.1:x21"
-_MOST_PLANES = 101
 _OF_RAW = ("dense", "correlation")
 
 
@@ -82,33 +79,12 @@ class SearchOptions:
 
         if self.method in _OF_RAW:
             raise FormatError(f"--method {self.method} is for raw images of cameras 2.0. Use --method epi.")
-        found: list[DepthMap] = []
-        views = rendering.arranged(views, self.views)
-        if self.method != "focus":
-            found.append(depth.epi(views, self.ends(), progress=shown))
-        if self.method in ("focus", "fused"):
-            sharp = depth.from_focus(views, self._planes(found, views))
-            found.append(sharp if self.method == "focus" else depth.disparity_of(sharp, views))
-        if self.method != "fused" and not self.smooth:
-            return found[0]
-        v, u = (n // 2 for n in views.aperture.shape)
-        return depth.fuse(found, views.view(v, u), smoothness=self.smooth or 1.0)
-
-    def _planes(self, found: "list[DepthMap]", views: "LightField") -> list[float]:
-        """Refocus factors of the focal stack: where disparities are known, a pixel apart in outer views."""
-        import numpy as np
-
-        from lumigraph import depth
-
-        if self.alphas is not None or not found:
-            return numbers("--alphas", self.alphas or _PLANES)
-        low, high = np.nanquantile(np.asarray(found[0].values, float), (0.02, 0.98))
-        count = max(views.aperture.shape)
-        spare = 2 / count
-        ends = depth.DepthMap(np.array([[high + spare, low - spare]]), np.ones((1, 2)), "disparity")
-        first, last = np.maximum(np.asarray(depth.alpha_of(ends, views).values)[0], 0.05)
-        planes = math.ceil((high - low + 2 * spare) * count) + 1
-        return [float(alpha) for alpha in np.linspace(first, last, min(max(21, planes), _MOST_PLANES))]
+        method: Any = "epi" if self.method == "auto" else self.method
+        return depth.estimate(
+            rendering.arranged(views, self.views), method, disparities=self.ends(),
+            alphas=None if self.alphas is None else numbers("--alphas", self.alphas),
+            smoothness=self.smooth, progress=shown,
+        )  # fmt: skip
 
     def of_raw(
         self, raw: "RawImage", calibration: "Calibration", sharp: "Sequence[float] | None", shown: Progress

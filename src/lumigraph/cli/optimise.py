@@ -9,8 +9,8 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files, optimised
 from lumigraph.cli.console import line, progress
-from lumigraph.cli.options import planes as planes_of
 from lumigraph.cli.options import Output, length
+from lumigraph.cli.options import planes as planes_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Result
 from lumigraph.errors import FormatError

@@ -114,7 +114,7 @@ def lengths(option: str, texts: "str | Sequence[str] | None") -> list[float]:
     for text in [texts] if isinstance(texts, str) else texts or ():
         for part in text.split(","):
             values, unit = spaced(part, option) if ":" in part else ([part.strip()], "")
-            found += [length(option, f"{value} {unit}") or 0.0 for value in values]
+            found += [length(option, f"{value} {unit}".strip()) or 0.0 for value in values]
     return found
 
 

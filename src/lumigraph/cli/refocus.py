@@ -40,8 +40,8 @@ class FocusOptions:
     alphas
         A range of refocus factors: first, last and step, such as 0.9:1.1:0.025, or their count, 0.9:1.1:x9.
     depth
-        Depth to focus on, from the focused plane, such as '5 mm' (farther), or a range '-10 um:10 um:5 um'; may
-        be repeated; needs --camera, which may be a microscope.
+        Depth to focus on, from the focused plane, such as '5 mm' (farther), or a range '-10 um:10 um:5 um';
+        may be repeated; needs --camera, which may be a microscope.
     """
 
     alpha: Annotated[list[float] | None, Parameter(consume_multiple=True)] = None

@@ -50,8 +50,8 @@ class TileOptions:
     finer
         Finer sampling than the pixels of a patch, 2 times or more, from all micro-images that show a place.
     smooth
-        Weight of smoothness for --finer: 0.02 resolves most; 0.1 to 0.3 removes the mesh that a noisy raw image or
-        three kinds of lenslets leave.
+        Weight of smoothness for --finer: 0.02 resolves most; 0.1 to 0.3 removes the mesh that a noisy raw
+        image or three kinds of lenslets leave.
     focus
         For three kinds of lenslets without --camera: the patch at which each is sharp, in pixels,
         such as '-13.5,-10.5,-7.5'.

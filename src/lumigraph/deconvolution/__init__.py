@@ -35,3 +35,7 @@ __all__ = [
     "deconvolve",
     "deconvolve_series",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -64,3 +64,7 @@ __all__ = [
     "load_camera",
     "scan",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -13,8 +13,8 @@ from lumigraph.errors import GeometryError
 from lumigraph.rendering.interpolate import as_float, neighbours
 
 
-def view(views: LightField[A], v: int, u: int) -> A:
-    """Picture (t, s[, c]) seen from view (v, u) of the aperture; negative indices count from the end.
+def sub_aperture(views: LightField[A], v: int, u: int) -> A:
+    """Sub-aperture image (t, s[, c]): the picture seen from view (v, u) of the aperture; negative indices count from the end.
 
     Raises
     ------

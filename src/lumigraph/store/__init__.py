@@ -29,3 +29,7 @@ __all__ = [
     "write_bytes",
     "write_note",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__
