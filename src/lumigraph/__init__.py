@@ -9,7 +9,7 @@ The everyday names, listed in `__init__.pyi`; each is imported when it is first 
 7.8
 """
 
-from lumigraph.core import camera_names, drawing, verb_module
+from lumigraph.core import upper_floors
 
 __version__ = "0.1.0"
 
@@ -40,13 +40,14 @@ def __dir__() -> list[str]:
     return __getattr__("__all__")
 
 
-def _verb(module: str, name: str) -> "Any":
+def _imported(module: str) -> "Any":
     from importlib import import_module
 
-    return getattr(import_module(f"lumigraph.{module}"), name)
+    return import_module(f"lumigraph.{module}")
 
 
-drawing.done_by(lambda: __getattr__("plots"))
-camera_names.loaded_by(lambda: _verb("instruments", "load_camera"))
-verb_module.called_by("lumigraph.depth", lambda: _verb("depth.estimate", "estimate"))
-verb_module.called_by("lumigraph.design", lambda: _verb("instruments.loading", "design"))
+upper_floors.register(
+    plots=lambda: __getattr__("plots"),
+    describe=lambda: _imported("describe"),
+    cameras=lambda: _imported("instruments"),
+)

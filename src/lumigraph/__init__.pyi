@@ -61,11 +61,9 @@ from .instruments import (
     PlenopticCamera as PlenopticCamera,
     SingleLensCamera as SingleLensCamera,
     catalogue as catalogue,
-    find_shifts as find_shifts,
-    joint_operator as joint_operator,
     load_camera as load_camera,
-    scan as scan,
 )
+from .metrology.scanning import find_shifts as find_shifts, joint_operator as joint_operator, scan as scan
 from .io import contents as contents, open as open, save as save
 from .studies import (
     adaptive as adaptive,

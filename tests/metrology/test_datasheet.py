@@ -240,6 +240,20 @@ def test_the_residual_of_several_white_images_holds_no_noise(light, drawn, of_fe
     assert many.interval[1] < alone.interval[0]
 
 
+def test_the_sheet_says_whether_noise_is_in_the_residual(drawn, of_few_and_many):
+    alone = lg.metrology.datasheet(replace(drawn, whites=drawn.whites[:1]))
+    how = [
+        next(one.how for one in sheet.entries if one.quantity.name == "residual_px")
+        for sheet in (alone, *of_few_and_many)
+    ]
+    assert how[0] == "rms of what phases are off the lattice; noise is in it"
+    assert (
+        how[1]
+        == how[2]
+        == ("rms of what phases are off the lattice; noise, by two halves of the exposures, is not in it")
+    )
+
+
 @pytest.mark.parametrize("name", ["snr_of_pixels", "snr_of_picture"])
 def test_noise_of_pixels_is_that_of_all_pairs(of_few_and_many, name):
     """The interval of four pairs is half as wide."""

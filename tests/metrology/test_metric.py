@@ -201,6 +201,21 @@ def test_boards_that_tell_nothing_are_refused(seen: Corners) -> None:
         Nominal(0.0, 5e-6, (10, 10))
 
 
+def test_six_corners_are_enough_for_a_picture_and_five_are_not(
+    seen: Corners, measured: lg.metrology.Measured
+) -> None:
+    """The least that a pose is found by, of a picture by itself and of one among others."""
+    first = seen[seen.frame == 0]
+    six, five = (first[np.isin(first.corner, [0, 3, 6, 14, 28, 34][:n])] for n in (6, 5))
+    (pose,) = measured.locate(six)
+    assert pose.shift == pytest.approx(measured.locate(first)[0].shift, abs=2e-3)
+    with pytest.raises(lg.CalibrationError, match=r"no picture has 6 corners .* the best has 5"):
+        measured.locate(five)
+    for few, poses in ((six, [0, 1, 3, 4]), (five, [1, 3, 4])):
+        kept = np.isin(seen.frame, [1, 3, 4]) | (seen.frame == 0) & np.isin(seen.corner, few.corner)
+        assert [one.frame for one in board(seen[kept], BOARD, NOMINAL).poses] == poses
+
+
 def test_one_picture_given_three_times_is_no_camera(seen: Corners) -> None:
     """b came out as 0, f to 12 µm, without a word."""
     one = seen[seen.frame == 0]

@@ -40,7 +40,7 @@ def convert(
 
     Example: `lumigraph convert camera.json --calibration white.toml --to compote -o intrinsics.json`
 
-    Example: `lumigraph convert camera.json --calibration white.toml --to lftoolbox --directions 9 -o Cal.json`
+    Example: `lumigraph convert camera.json --calibration white.toml --to lftoolbox --directions 9 -o a.json`
 
     Example: `lumigraph convert intrinsics.json -o calibration.toml`
 

@@ -48,7 +48,7 @@ __all__ = [
     "virtual_depth",
 ]
 
-make_callable(__name__)
+make_callable(__name__, estimate)
 del make_callable
 
 

@@ -12,13 +12,14 @@ The module itself can be called: `lumigraph.design(camera)` gives all that follo
 there are given corrected here.
 """
 
+from lumigraph.core import upper_floors
 from lumigraph.core.verb_module import make_callable
 from lumigraph.design import microscope, plenoptic1, plenoptic2, resolution, thin_lens
 
 __all__ = ["microscope", "plenoptic1", "plenoptic2", "resolution", "thin_lens"]
 
-make_callable(__name__)
-del make_callable
+make_callable(__name__, upper_floors.design)
+del make_callable, upper_floors
 
 
 def __dir__() -> list[str]:

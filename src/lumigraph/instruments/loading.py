@@ -4,7 +4,6 @@ from os import PathLike
 from pathlib import Path
 
 from lumigraph.instruments import files
-from lumigraph.instruments.description import Description
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.microscope import LightFieldMicroscope
 from lumigraph.instruments.plenoptic1 import PlenopticCamera
@@ -42,22 +41,6 @@ def load_camera(path: str | PathLike[str]) -> AnyCamera:
     if not Path(name).exists() and not name.endswith(".toml") and "/" not in name:
         return camera_of(files.read_catalogue(name), name)
     return camera_of(files.read(path), name)
-
-
-def design(camera: Instrument | str | PathLike[str]) -> Description:
-    """Everything that follows from a camera's description: what `lumigraph.design(camera)` returns.
-
-    Parameters
-    ----------
-    camera
-        A camera, its file, or its name in the catalogue.
-
-    Examples
-    --------
-    >>> round(design("thesis-plenoptic-2-m050").as_dict()["lenslet distance"] * 1e3, 3)
-    7.8
-    """
-    return (load_camera(camera) if isinstance(camera, str | PathLike) else camera).describe()
 
 
 def camera_of(table: dict, origin: str) -> AnyCamera:

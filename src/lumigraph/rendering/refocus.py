@@ -48,8 +48,8 @@ def refocus(
     alpha
         F / F', above 0.
     aperture
-        Width of the aperture that is used, relative to all of it: smaller is sharper in depth, and noisier; see
-        `reduce_aperture` for other shapes.
+        Width of the aperture that is used, relative to all of it: smaller is sharper in depth, and noisier;
+        see `reduce_aperture` for other shapes.
     interpolation
         "cubic", "linear" or "band_limited", between lenslets.
     oversample

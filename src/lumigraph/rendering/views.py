@@ -14,7 +14,7 @@ from lumigraph.rendering.interpolate import as_float, neighbours
 
 
 def sub_aperture(views: LightField[A], v: int, u: int) -> A:
-    """Sub-aperture image (t, s[, c]): the picture seen from view (v, u) of the aperture; negative indices count from the end.
+    """Sub-aperture image (t, s[, c]) seen from view (v, u) of the aperture; negative indices from the end.
 
     Raises
     ------

@@ -10,6 +10,5 @@
 import lazy_loader
 
 __getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__, {"adaptive", "information", "optimisation", "thesis", "tolerance"}
+    __name__, submodules={"adaptive", "information", "optimisation", "thesis", "tolerance"}
 )
-del lazy_loader

@@ -27,8 +27,8 @@ def show(
     Parameters
     ----------
     thing
-        `LightField`, `RawImage`, `Stack` or `Volume`; the path of a file that `lumigraph view` takes; a camera,
-        its file, or its name in the catalogue.
+        `LightField`, `RawImage`, `Stack` or `Volume`; the path of a file that `lumigraph view` takes; a
+        camera's file, or its name in the catalogue.
     calibration
         Micro-images of a raw image in memory, which is then decoded too.
     port

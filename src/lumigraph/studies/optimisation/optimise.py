@@ -134,7 +134,7 @@ def optimise(
     instrument
         A camera, its file, or a name of the catalogue.
     vary
-        By keys of the camera file: "0.3:0.6:x4" or "4 mm:6 mm:x3" is a range, of which so many values are tried
+        By keys of the camera file: "0.3:0.6:x4" or "4 mm:6 mm:1 mm" is a range, whose values are tried
         first; "100 um, 150 um" a stock.
     goal
         `Goal`, or its text: "depth" (default), "lateral", "brightness", "picture error", "largest light
