@@ -13,7 +13,7 @@ from importlib.metadata import version
 from typing import get_args
 
 from cyclopts import App
-from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownCommandError, UnknownOptionError
+from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownCommandError
 
 from lumigraph.cli.batch import batch
 from lumigraph.cli.board import board
@@ -148,18 +148,23 @@ def _usage(error: CycloptsError) -> str:
         return _unknown(error.unused_tokens[0])
     verb = " ".join(error.command_chain or ())
     hint = f"lumigraph {verb} --help".replace("  ", " ")
-    text = (_missing(error, verb) if isinstance(error, MissingArgumentError) else _renamed(error)).rstrip(".")
+    text = _renamed(COMMAND.get()) or (
+        _missing(error, verb) if isinstance(error, MissingArgumentError) else str(error)
+    )
+    text = text.rstrip(".")
     return f"{text}{'' if text.endswith('?') else '.'} Try '{hint}'."
 
 
-def _renamed(error: CycloptsError) -> str:
-    """Message of an error, with the new name of an option that has another one now."""
-    if not isinstance(error, UnknownOptionError):
-        return str(error)
-    old = (error.token.keyword or error.token.value).partition("=")[0]
-    known = {name for one in error.argument_collection for name in one.names}
-    new = next((name for name in RENAMED.get(old, ()) if name in known), None)
-    return str(error) if new is None else f"{old} is now called {new}. Did you mean {new}?"
+def _renamed(words: Sequence[str]) -> str | None:
+    """Message with the new name of an option that has another one now; None if there is no such option."""
+    if not words or words[0] not in {verb.__name__ for verb in VERBS}:
+        return None
+    known = {name for one in app[words[0]].assemble_argument_collection() for name in one.names}
+    for old in (word.partition("=")[0] for word in words):
+        new = next((name for name in RENAMED.get(old, ()) if name in known), None)
+        if new is not None and old not in known:
+            return f"{old} is now called {new}. Did you mean {new}?"
+    return None
 
 
 def _missing(error: MissingArgumentError, verb: str) -> str:

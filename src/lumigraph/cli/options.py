@@ -35,10 +35,13 @@ class Common:
         Print one JSON object, lengths in metres.
     debug
         Show the traceback of an error.
+    overwrite
+        Replace outputs that another command, or the same one for other inputs, has written.
     """
 
     json: Annotated[bool, Parameter(negative="")] = False
     debug: Annotated[bool, Parameter(negative="")] = False
+    overwrite: Annotated[bool, Parameter(negative="")] = False
 
 
 COMMON = Common()

@@ -205,8 +205,10 @@ def _check_output(output: Path, count: int) -> None:
         files.check_output(output, files.PICTURES if count == 1 else (".tif", ".tiff", *files.MOVIES))
     elif output.exists() and not output.is_dir():
         raise FormatError(f"{output} is a file. Give a folder, or a stack that ends in .tiff.")
-    elif not output.parent.is_dir():
-        raise FormatError(f"the folder {output.parent} for {output.name} does not exist. Make it first.")
+    else:
+        from lumigraph.io.target import check_parent
+
+        check_parent(output)
 
 
 def _write(images: list[Any], alphas: list[float], output: Path) -> list[Path]:
@@ -223,7 +225,7 @@ def _write(images: list[Any], alphas: list[float], output: Path) -> list[Path]:
         return [output]
     paths = [output / f"refocused-{k:03}-alpha-{alpha:.4f}.png" for k, alpha in enumerate(alphas)]
     files.check_inside(paths)
-    output.mkdir(exist_ok=True)
+    output.mkdir(parents=True, exist_ok=True)
     # One white for all, so that the pictures of a folder can be compared.
     white = max(float(image.max()) for image in images) or None
     for image, path in zip(images, paths, strict=True):
