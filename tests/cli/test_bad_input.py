@@ -195,7 +195,9 @@ OPTIONS = {
     "NaN pitch": ((*CALIBRATE, "--pitch", "nan"), ["--pitch is nan"]),
     "negative micro-image pitch": ((*CALIBRATE, "--pitch", "-3"), ["--pitch is -3 px"]),
     "pitch that is not there": ((*CALIBRATE, "--pitch", "40"), ["40"]),
-    "output below a file": (("calibrate", "white.tiff", "-o", "camera.toml/c.toml"), ["camera.toml is a file"]),
+    "output below a file": (
+        ("calibrate", "white.tiff", "-o", "camera.toml/c.toml"), ["camera.toml is a file"],
+    ),
     "unknown output": (("calibrate", "white.tiff", "-o", "c.json"), ["c.json", ".toml"]),
     "unknown overlay": ((*CALIBRATE, "--overlay", "o.gif"), ["o.gif", ".png, .svg, .pdf"]),
     "output is a folder": (("simulate", "camera.toml", "--scene", "white", "-o", "folder.png"), ["folder"]),

@@ -39,9 +39,7 @@ def check_output(path: Path, endings: Sequence[str]) -> None:
     else:
         check_target(path, endings)
     if path.suffix.lower() in (".jpg", ".jpeg"):
-        line(
-            f"{path} will be a JPEG, which loses detail. Write .png or .tiff to measure or process it further."
-        )
+        line(f"{path} will be a JPEG, which loses detail. Write .png or .tiff to measure or process it.")
 
 
 def note_written(paths: Iterable[Path]) -> None:

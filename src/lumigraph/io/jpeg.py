@@ -70,8 +70,8 @@ def save(raw: RawImage, path: Path, *, white: float | None = None) -> None:
     data = to_integers(raw.data, white=white, bits=8)
     if data.dtype != np.uint8:
         raise FormatError(
-            f"a JPEG holds 8 bits but the picture is {data.dtype}. Use PNG or TIFF, or give floats, which are "
-            "scaled."
+            f"a JPEG holds 8 bits but the picture is {data.dtype}. Use PNG or TIFF, or give floats, which "
+            "are scaled."
         )
     if max(data.shape[:2]) > _LARGEST:
         raise FormatError(
