@@ -5,7 +5,9 @@ from os import PathLike
 TYPE_CHECKING = False  # `typing` is slow to import, and `import lumigraph` imports this
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any
+    from typing import Any, TypeVar
+
+    T = TypeVar("T")
 
 _homes: "dict[str, Callable[[], Any]]" = {}
 
@@ -25,7 +27,7 @@ def describe(name: str, instrument: "Any") -> "Any":
     return _function("describe", name)(instrument)
 
 
-def camera(given: "Any") -> "Any":
+def camera(given: "T | str | PathLike[str]") -> "T":
     """The camera of a file or of a name in the catalogue; a camera as it is.
 
     Raises

@@ -4,7 +4,7 @@ import math
 from builtins import map as serial_map
 from collections.abc import Callable, Iterable
 from os import PathLike
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -107,7 +107,7 @@ def simulate(
     camera = upper_floors.camera(camera)
     coherence = Incoherent() if coherence is None else coherence
     if hasattr(scene, "dtype"):
-        scene = photo(camera.scene_grid, scene)
+        scene = photo(cast("Any", camera).scene_grid, cast("Any", scene))
     if isinstance(scene, Volume):
         planes = zip(scene.data, scene.depths, strict=True)
         scene = Scene(Slice(plane, scene.grid, dz) for plane, dz in planes)
