@@ -35,7 +35,8 @@ def camera(given: "T | str | PathLike[str]") -> "T":
     FormatError
         No such file or name, or no camera in it.
     """
-    return _function("cameras", "load_camera")(given) if isinstance(given, str | PathLike) else given
+    found: Any = given
+    return _function("cameras", "load_camera")(found) if isinstance(given, str | PathLike) else found
 
 
 def design(given: "Any") -> "Any":
