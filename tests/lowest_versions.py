@@ -51,7 +51,7 @@ def test_frames_are_refocused_into_a_store(pictures):
 
 
 def test_tables_become_parquet_and_netcdf(pictures):
-    vary = "lenslets.focal_length=9 mm:11 mm:2"
+    vary = "lenslets.focal_length=9 mm:11 mm:x2"
     for output in ("t.parquet", "t.nc"):  # pyarrow, xarray with h5py or SciPy
         run(
             "sweep",

@@ -26,7 +26,7 @@ from lumigraph.rendering import (
     refocus_stack,
     render,
     rendered_grid,
-    view,
+    sub_aperture,
     views_from_mosaic,
     views_mosaic,
 )
@@ -213,7 +213,7 @@ def test_mosaics_hold_views_and_micro_images(rng):
 
 def test_views_and_points_of_view(rng):
     views = field(rng)
-    np.testing.assert_array_equal(view(views, 1, -1), views.data[1, -1])
+    np.testing.assert_array_equal(sub_aperture(views, 1, -1), views.data[1, -1])
     np.testing.assert_allclose(point_of_view(views, 1.0, -2.0), views.data[3, 0])
     np.testing.assert_allclose(point_of_view(views, 0.5, 0), (views.data[2, 2] + views.data[3, 2]) / 2)
 
@@ -226,6 +226,8 @@ def test_a_smaller_aperture_keeps_the_middle(rng, n):
     np.testing.assert_array_equal(small.data[2, 2], views.data[n // 2, n // 2])
     assert small.aperture.y[2] == 0
     np.testing.assert_array_equal(reduce_aperture(views, 1).data, views.data)
+    np.testing.assert_array_equal(refocus(views, 1.1, aperture=0.5), refocus(small, 1.1))
+    assert np.abs(refocus(views, 1.1, aperture=0.5) - refocus(views, 1.1)).max() > 1e-3
     round_one = reduce_aperture(views, 1, shape="round")
     assert not round_one.data[0, 0].any()
     np.testing.assert_array_equal(round_one.data[n // 2, 1], views.data[n // 2, 1])
@@ -277,7 +279,7 @@ def test_bad_numbers_are_refused(rng):
     with pytest.raises(GeometryError, match="both numbers must be at least 1"):
         refocus(views, 1.1, oversample=0)
     with pytest.raises(GeometryError, match=r"no view \(5, 0\): the aperture has 5 x 5"):
-        view(views, 5, 0)
+        sub_aperture(views, 5, 0)
     with pytest.raises(GeometryError, match="y is 3 m but the views lie between -2 and 2 m"):
         point_of_view(views, 3, 0)
     with pytest.raises(GeometryError, match=r"fraction is 1\.5 but must be above 0 and at most 1"):

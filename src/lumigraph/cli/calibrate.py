@@ -111,13 +111,13 @@ def calibrate(
     from lumigraph.preparation import read_pages
 
     common.check()
-    files.check_output(output, (".toml",))
-    if overlay is not None:
-        files.check_output(overlay, files.FIGURES)
     if not white:
         raise CalibrationError(
             "no white image is given. Write 'lumigraph calibrate white.png -o lattice.toml'."
         )
+    files.check_output(output, (".toml",))
+    if overlay is not None:
+        files.check_output(overlay, files.FIGURES)
     above_zero("--pitch", pitch, "px")
     if explain and bench.camera is None:
         raise CalibrationError("--explain compares with the design: give the camera file, --camera FILE.")
