@@ -7,6 +7,7 @@ playwright and Chromium (`tests/viewer/conftest.py` finds the same one).
 import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -59,13 +60,15 @@ def first() -> None:
     views = sample.views
     data = np.asarray(views.data)
     v, u, t, s, colours = data.shape
-    raw = data.transpose(2, 0, 3, 1, 4).reshape(t * v, s * u, colours)
+    y, x = np.ogrid[:v, :u]
+    stop = np.hypot(y - v // 2, x - u // 2) < v / 2  # round, as a camera's
+    raw = (data * stop[:, :, None, None, None]).transpose(2, 0, 3, 1, 4).reshape(t * v, s * u, colours)
     step = views.lenslets.pitch[1] / views.aperture.pitch[1]
     near, far = (lg.refocus(views, 1 - d * step) for d in (1.9, -1.5))
     depth = np.asarray(lg.depth.epi(views).values)
     depth = plt.get_cmap("viridis")((depth - np.nanmin(depth)) / np.ptp(depth[np.isfinite(depth)]))[..., :3]
-    part = raw[90 * v : 106 * v, 118 * u : 140 * u]
-    pictures = [(shown(part), "raw image (a part): a micro-image per lenslet")]
+    part = raw[62 * v : 86 * v, 112 * u : 144 * u]
+    pictures = [(shown(part), "raw image (a part), 9 x 9 pixels a lenslet")]
     pictures += [(shown(near), "focus near"), (shown(far), "focus far"), (depth, "disparity")]
     row(pictures, "first.png", 2.2)
 
@@ -84,7 +87,11 @@ def bench() -> None:
     )  # fmt: skip
     views = lg.decode(lg.devignette(sample.raw, sample.white), calibration)
     pictures = []
-    for alpha, title in ((0.9, "α' = 0.9: the star in front"), (1.0, "1.0: the chart"), (1.1, "1.1: the star behind")):
+    for alpha, title in (
+        (0.9, "α' = 0.9: the star in front"),
+        (1.0, "1.0: the chart"),
+        (1.1, "1.1: the star behind"),
+    ):
         picture = np.asarray(lg.refocus(views, alpha, oversample=4), float)
         pictures.append((picture / np.nanmax(picture), title))
     row(pictures, "bench-refocused.png", 1.6)
@@ -122,9 +129,9 @@ def design() -> None:
 
 def viewer() -> None:
     """The viewer with the sample scene: viewer.png."""
-    lg.save(lg.samples.scene().views, STATIC / "_scene.zarr")
-    screenshot(["view", str(STATIC / "_scene.zarr")], "viewer.png")
-    subprocess.run(["rm", "-r", str(STATIC / "_scene.zarr")], check=True)
+    with tempfile.TemporaryDirectory() as folder:
+        lg.samples.write(Path(folder), ("scene",))
+        screenshot(["view", f"{folder}/scene.zarr"], "viewer.png")
 
 
 def designer() -> None:
@@ -139,7 +146,8 @@ def screenshot(command: list[str], name: str) -> None:
     words = [str(Path(sys.executable).with_name("lumigraph")), *command, "--no-open"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server, sync_playwright() as play:
         try:
-            address = re.search(r"http://\S+", server.stdout.readline())[0]
+            lines = iter(server.stdout.readline, "")
+            address = next(found[0] for line in lines if (found := re.search(r"http://\S+", line)))
             path = str(SYSTEM) if SYSTEM.exists() else None
             browser = play.chromium.launch(executable_path=path, args=FLAGS)
             page = browser.new_page(viewport={"width": 1280, "height": 800})
