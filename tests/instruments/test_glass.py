@@ -57,7 +57,7 @@ class Lens:
 
 @pytest.fixture
 def known(monkeypatch):
-    monkeypatch.setenv("lumigraphCACHE", "off")
+    monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
     monkeypatch.setattr(glass, "Prescription", Lens)
     glass._glass.cache_clear()
     glass._first_order.cache_clear()
@@ -343,7 +343,7 @@ def test_what_is_no_prescription_is_one_line(value, others, match):
 
 
 def test_without_optiland_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setenv("lumigraphCACHE", "off")
+    monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
     monkeypatch.setitem(sys.modules, "optiland", None)
     path = tmp_path / "lens.zmx"
     path.write_text("MODE SEQ\n")

@@ -34,7 +34,7 @@ def test_the_focal_length_follows_the_glass_and_nothing_else_moves(kind):
 
 
 def test_colours_of_pictures_and_of_operators_are_those_of_the_glass(monkeypatch, tmp_path):
-    monkeypatch.setenv("lumigraphCACHE", str(tmp_path))
+    monkeypatch.setenv("LUMIGRAPH_CACHE", str(tmp_path))
     known = camera(FocusedPlenopticCamera, index=1.62, abbe=20.0)
     plain = known.replace(lenslets={"abbe": None})
     blue = lg.Spectrum((450e-9,), ((1.0,),))

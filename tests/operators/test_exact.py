@@ -208,7 +208,7 @@ def test_paraxial_images_say_how_far_off_they_are():
 
 
 def test_slices_of_exact_cameras_count_what_the_field_changes(monkeypatch, tmp_path):
-    monkeypatch.setenv("lumigraphCACHE", str(tmp_path))
+    monkeypatch.setenv("LUMIGRAPH_CACHE", str(tmp_path))
     known = camera(model="auto", f_number=8.0).replace(lenslets={"count": (3, 3)})
     grid = lg.Grid.square(5, known.object_grid.pitch[0])
     scene = Scene([Slice(np.ones(grid.shape), grid, 0.0)])

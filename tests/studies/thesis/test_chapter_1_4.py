@@ -21,7 +21,7 @@ SLOW = ("table-4.2", "figure-1.20", "figure-4.8", "figure-4.12")  # 10 s and mor
 
 @pytest.mark.parametrize("name", [name for name in IDS if name not in SLOW])
 def test_all_rows_pass_at_reduced_size(name, monkeypatch):
-    monkeypatch.delenv("lumigraphDATA", raising=False)
+    monkeypatch.delenv("LUMIGRAPH_DATA", raising=False)
     (one,) = find([name])
     outcome = one.run(Context(quick=True))
     assert outcome.figures

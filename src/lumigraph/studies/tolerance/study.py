@@ -178,7 +178,8 @@ def study(
     items = trials.items(draws)
     if output is None:
         return Study.of(trials, [trials(item).row for item in items])
-    cluster.batch(trials, items, output, what=trials.what, workers=workers)
+    files = cluster.inputs.named_in(trials.camera)
+    cluster.batch(trials, items, output, what=trials.what, inputs=files, workers=workers)
     with cluster.rows(output) as rows:
         return Study.of(trials, rows)
 
