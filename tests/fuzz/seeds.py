@@ -252,17 +252,17 @@ def seeds() -> dict[str, tuple[list[Tree], Callable[[Tree], Tree] | None]]:
 
 def _metric(rng: np.random.Generator) -> list[Tree]:
     """A table of corners, a folder of COMPOTE's, and a measured camera."""
-    corners = lg.metric.Corners(
+    corners = lg.metrology.Corners(
         np.repeat([0, 1], 4), np.arange(8) % 5, rng.random((8, 2)), rng.random((8, 2)), np.arange(8) % 3
     )
-    pose = lg.metric.Pose(0, np.zeros(3), np.ones(3), np.eye(6), 0.1, 0.1)
-    camera = lg.metric.MetricCamera(0.05, 0.06, 1e-3, 0.06, 5e-6, (10.0, 12.0))
-    noise, board = Noise(np.ones(1), 0.1), lg.metric.Board((3, 4), 0.01)
-    measured = lg.metric.Measured(camera, np.eye(14), noise, board, (pose,), 0.1, 1, ("a note",))
+    pose = lg.metrology.Pose(0, np.zeros(3), np.ones(3), np.eye(6), 0.1, 0.1)
+    camera = lg.metrology.MetricCamera(0.05, 0.06, 1e-3, 0.06, 5e-6, (10.0, 12.0))
+    noise, board = Noise(np.ones(1), 0.1), lg.metrology.Board((3, 4), 0.01)
+    measured = lg.metrology.Measured(camera, np.eye(14), noise, board, (pose,), 0.1, 1, ("a note",))
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        lg.metric.save_corners(corners, folder / "corners.csv")
-        lg.metric.save(measured, folder / "measured.json")
+        lg.metrology.save_corners(corners, folder / "corners.csv")
+        lg.metrology.save(measured, folder / "measured.json")
         found = read_tree(folder)
     return [*({name: content} for name, content in found.items()), COMPOTE]
 

@@ -139,7 +139,7 @@ def study(
     draws
         Cameras drawn by chance.
     measure
-        Names of `measures`, or of `lumigraph.metrology.datasheet.simulated`, which takes minutes for each camera.
+        Names of `measures`, or of `lumigraph.metrology.datasheet.simulated`, minutes for each camera.
     seed
         Of all that is drawn: the same one draws the same.
     output
