@@ -72,7 +72,11 @@ def test_a_tutorial_has_two_pictures_or_more():
             assert ((pages.ROOT / page).parent / name).is_file(), name
 
 
-GUIDES = [path for kind in ("tutorials", "how-to", "explanations") for path in sorted(pages.ROOT.glob(f"docs/{kind}/*.md"))]
+GUIDES = [
+    path
+    for kind in ("tutorials", "how-to", "explanations")
+    for path in sorted(pages.ROOT.glob(f"docs/{kind}/*.md"))
+]
 
 
 @pytest.mark.parametrize("path", [*GUIDES, pages.ROOT / "README.md"], ids=lambda path: path.stem)
