@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = ("README.md", *(f"docs/tutorials/{name}.md" for name in ("first-picture", "design", "microscope")))
 EXCUSED = {
     r"^(make|pip|python3|source|\.venv/bin|\.ci/run)\b": "sets lumigraph up, or works on its sources",
+    r"^lumigraph optimise camera\.toml": "a search: some minutes",
     r"^lumigraph deconvolve raw\.tif .*lfm-guv": "the reader's own raw image",
 }
 """Commands that are not run, and why."""
