@@ -131,7 +131,7 @@ def main() -> None:
         folder = Path(name)
         (folder / "focused.toml").write_text(camera(count=(4, 4)).to_toml())
         words = ["-m", "lumigraph", "dataset", str(folder / "focused.toml"), "-n", str(options.frames)]
-        words += ["--z", "-6 mm:6 mm:6 mm", "-o"]
+        words += ["--depth", "-6 mm:6 mm:6 mm", "-o"]
         disturbed = Cluster([*words, str(folder / "killed.zarr")], host, prefixes)
         try:
             killed = run(disturbed, folder / "killed.zarr", options.frames)

@@ -32,11 +32,11 @@ HELD_OUT = tuple(
 """Points (y, x, dz) whose place is fitted."""
 EVALUATIONS, DRAWS, OTHERS = 30, 200, range(3, 11)
 
-PITCHES = {2: "1.5 mm:2.3 mm:3", 3: "1.1 mm:2.3 mm:3", 4: "0.8 mm:1.5 mm:3", 5: "0.6 mm:1.1 mm:3"}
+PITCHES = {2: "1.5 mm:2.3 mm:x3", 3: "1.1 mm:2.3 mm:x3", 4: "0.8 mm:1.5 mm:x3", 5: "0.6 mm:1.1 mm:x3"}
 """Of n × n lenslets."""
 # The relay, the pitch and the lenslets' focal length scaled together give the same images, farther apart.
-LENGTHS = {"fourier_lens": "65 mm:95 mm:2", "lenslets.focal_length": "5 mm:25 mm:3"}
-MIDDLE = {"fourier_lens": "65 mm:95 mm:1", "lenslets.focal_length": "8 mm:24 mm:1"}
+LENGTHS = {"fourier_lens": "65 mm:95 mm:x2", "lenslets.focal_length": "5 mm:25 mm:x3"}
+MIDDLE = {"fourier_lens": "65 mm:95 mm:x1", "lenslets.focal_length": "8 mm:24 mm:x1"}
 
 NEAR, FAR, EVEN = -0.035, 0.035, 0.003
 """By what part focal lengths are longer where a search begins."""
@@ -55,8 +55,10 @@ def in_rows() -> tuple[LightFieldMicroscope, dict[str, str]]:
     changes = (FAR, -EVEN, FAR, NEAR, EVEN, NEAR, FAR, -EVEN, FAR)
     single = {n: {"focal_change": c} for n, c in enumerate(changes, 1)}
     start = {"pitch": 1.5 * mm, "focal_length": 14 * mm, "single": single}
-    vary = {**MIDDLE, "lenslets.pitch": "1.2 mm:2.2 mm:1"}
-    return SCOPE.replace(fourier_lens=80 * mm, lenslets=start), vary | _own("focal_change", 9, "-0.08:0.08:1")
+    vary = {**MIDDLE, "lenslets.pitch": "1.2 mm:2.2 mm:x1"}
+    return SCOPE.replace(fourier_lens=80 * mm, lenslets=start), vary | _own(
+        "focal_change", 9, "-0.08:0.08:x1"
+    )
 
 
 def on_a_ring() -> tuple[LightFieldMicroscope, dict[str, str]]:
@@ -76,7 +78,7 @@ def on_a_ring() -> tuple[LightFieldMicroscope, dict[str, str]]:
         "focal_length": 17 * mm,
         "single": single,
     }
-    vary = {**MIDDLE, "lenslets.fill_factor": "0.8:1:1"} | _own("focal_change", count, "-0.08:0.08:1")
+    vary = {**MIDDLE, "lenslets.fill_factor": "0.8:1:x1"} | _own("focal_change", count, "-0.08:0.08:x1")
     for n, (y, x) in enumerate((moved / mm).tolist(), 1):
         vary[f"lenslets.single.{n}.offset_y"] = f"{y - 0.4:.4f} mm:{y + 0.4:.4f} mm:1"
         vary[f"lenslets.single.{n}.offset_x"] = f"{x - 0.4:.4f} mm:{x + 0.4:.4f} mm:1"

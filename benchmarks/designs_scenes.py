@@ -38,8 +38,8 @@ PICTURES, COARSER, SQUARES = ("cell", "coins", "camera", "gravel"), (4, 4), 16
 RELAY = 95 * mm
 """Fourier lens of regular arrays: scaled together with pitch and focal length it gives the same images."""
 PITCHES = {
-    3: "0.8 mm:2.2 mm:4", 4: "0.6 mm:1.6 mm:4", 5: "0.5 mm:1.3 mm:4", 6: "0.4 mm:1.1 mm:3",
-    7: "0.4 mm:0.9 mm:3",
+    3: "0.8 mm:2.2 mm:x4", 4: "0.6 mm:1.6 mm:x4", 5: "0.5 mm:1.3 mm:x4", 6: "0.4 mm:1.1 mm:x3",
+    7: "0.4 mm:0.9 mm:x3",
 }  # fmt: skip
 """Of n × n lenslets."""
 KINDS = {"1,3,7,9": 0.0305, "2,8": -0.0062, "4,6": -0.034, "5": 0.0009}
@@ -58,7 +58,7 @@ def of_kinds() -> tuple[LightFieldMicroscope, dict[str, str]]:
     start = changed(scope, designs.FOUND["3 x 3, own focal lengths"])
     own = {f"lenslets.single.{which}.focal_change": c for which, c in KINDS.items()}
     free = {key: values for key, values in vary.items() if "single" not in key}
-    return changed(start, own), free | dict.fromkeys(own, "-0.08:0.08:1")
+    return changed(start, own), free | dict.fromkeys(own, "-0.08:0.08:x1")
 
 
 Search = tuple[Goal, Any, dict[str, str], int]

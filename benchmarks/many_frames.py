@@ -42,7 +42,7 @@ from lumigraph.units import um
 
 RAW = {"plenoptic": (31, 31), "focused": (21, 21)}
 SCOPE = ["batch", "deconvolve", "guv.tif", "--camera", "guv.toml"]
-DEEP = [*SCOPE, "--z", "-10 um:10 um:5 um", "--samples", "3", "--iterations"]
+DEEP = [*SCOPE, "--depth", "-10 um:10 um:5 um", "--samples", "3", "--iterations"]
 JOBS: dict[str, list[str]] = {
     "decode": ["batch", "decode", "plenoptic.tif", "--camera", "plenoptic.toml"],
     "refocus": ["batch", "refocus", "plenoptic.tif", "--camera", "plenoptic.toml", "--alpha", "0.95"],
@@ -50,7 +50,7 @@ JOBS: dict[str, list[str]] = {
     "render": ["batch", "render", "focused.tif", "--camera", "focused.toml"],
     "deconvolve, 5 planes, 3 samples": [*DEEP, "8"],
     "deconvolve, 3 planes, 5 samples": [
-        *SCOPE, "--z", "-4 um:4 um:4 um", "--samples", "5", "--iterations", "4",
+        *SCOPE, "--depth", "-4 um:4 um:4 um", "--samples", "5", "--iterations", "4",
     ],
     "deconvolve, 2.0": [
         "batch", "deconvolve", "focused.tif", "--camera", "focused.toml", "--iterations", "4",
@@ -60,7 +60,7 @@ JOBS: dict[str, list[str]] = {
         "sweep", "focused.toml", "--measure", "mtf50_middle",
         "--vary", "lenslets.focal_length=5 mm:5.4 mm:{frames}",
     ],
-    "dataset": ["dataset", "focused.toml", "-n", "{frames}", "--z", "-6 mm:6 mm:6 mm"],
+    "dataset": ["dataset", "focused.toml", "-n", "{frames}", "--depth", "-6 mm:6 mm:6 mm"],
 }  # fmt: skip
 """Words of the command line, but for the output."""
 
@@ -134,7 +134,7 @@ def growth(frames: int, folder: Path) -> None:
     (folder / "small.toml").write_text(scope.to_toml())
     pages = (rng.poisson(200, (75, 75)).astype(np.uint16) for _ in range(frames))
     tifffile.imwrite(path, pages, shape=(frames, 75, 75), dtype=np.uint16, photometric="minisblack")
-    words = ["batch", "deconvolve", str(path), "--camera", "small.toml", "--z", "4 um", "--samples", "3"]
+    words = ["batch", "deconvolve", str(path), "--camera", "small.toml", "--depth", "4 um", "--samples", "3"]
     output = folder / "volumes.zarr"
     lumigraph([*words, "--iterations", "2", "-o", str(output), "--workers", "1"])
     peaks = [entry.memory for _, entry in sorted(cluster.status(output).entries.items())]
@@ -211,7 +211,7 @@ def of_ledger(frames: int, folder: Path) -> None:
 def kills(frames: int, folder: Path) -> None:
     """Whether a data set that was killed five times has the bits of one that was not."""
     (folder / "focused.toml").write_text(camera(count=(4, 4)).to_toml())
-    words = ["dataset", "focused.toml", "-n", str(frames), "--z", "-6 mm:6 mm:6 mm"]
+    words = ["dataset", "focused.toml", "-n", str(frames), "--depth", "-6 mm:6 mm:6 mm"]
     _killed(words, frames, [folder / name for name in ("killed.zarr", "whole.zarr")])
 
 
@@ -297,7 +297,7 @@ def standard(frames: int, folder: Path) -> None:
     film = np.random.default_rng(0).poisson(200, (frames, 1463, 1273)).astype(np.uint16)
     tifffile.imwrite(folder / "standard.tif", film, photometric="minisblack")
     words = ["batch", "deconvolve", "standard.tif", "--camera", "standard.toml", "--samples", "19"]
-    words += ["--z=-60 um:60 um:5 um", "--iterations", "4", "--workers", "2"]
+    words += ["--depth=-60 um:60 um:5 um", "--iterations", "4", "--workers", "2"]
     began = time.perf_counter()
     if lumigraph([*words, "-o", str(folder / "standard.zarr")]):
         raise SystemExit("it failed")

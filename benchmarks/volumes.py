@@ -48,7 +48,7 @@ def volume(numbers: np.ndarray, iterations: int, folder: Path) -> np.ndarray:
     for words in (
         ["calibrate", str(raw), "-o", str(lattice)],
         ["deconvolve", str(raw), "--camera", str(folder / "brain.toml"), "--calibration", str(lattice),
-         f"--z={depths}", "--samples", str(SAMPLES), "--iterations", str(iterations), "-o", str(found)],
+         f"--depth={depths}", "--samples", str(SAMPLES), "--iterations", str(iterations), "-o", str(found)],
     ):  # fmt: skip
         if lumigraph(words):
             raise SystemExit(f"{words[0]} failed")

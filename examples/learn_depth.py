@@ -1,6 +1,6 @@
 """A data set of `lumigraph dataset` in PyTorch: raw images, pictures and depths, read where they are needed.
 
-First: lumigraph dataset thesis-plenoptic-1 -n 500 --z "-60 mm:60 mm:20 mm" -o train.zarr
+First: lumigraph dataset thesis-plenoptic-1 -n 500 --depth "-60 mm:60 mm:20 mm" -o train.zarr
 """
 
 import sys

@@ -43,7 +43,7 @@ def test_frames_are_refocused_into_a_store(samples):
 
 
 def test_tables_become_parquet_and_netcdf(samples):
-    vary = "lenslets.focal_length=3.4 mm:3.8 mm:2"
+    vary = "lenslets.focal_length=3.4 mm:3.8 mm:x2"
     for output in ("t.parquet", "t.nc"):  # pyarrow, xarray with h5py or SciPy
         run(
             "sweep",

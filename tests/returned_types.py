@@ -14,7 +14,7 @@ def arrays_keep_their_type(views: lg.LightField[np.ndarray], raw: lg.RawImage[np
     assert_type(lg.refocus(views, 1.1), np.ndarray)
     assert_type(lg.refocus_stack(views, [1.0, 1.1]), np.ndarray)
     assert_type(lg.refocus_fourier(views, 1.1), np.ndarray)
-    assert_type(lg.view(views, 0, 0), np.ndarray)
+    assert_type(lg.sub_aperture(views, 0, 0), np.ndarray)
     assert_type(lg.view_path(views), np.ndarray)
     assert_type(lg.reduce_aperture(views, 0.5), lg.LightField[np.ndarray])
     assert_type(views.view(0, 0), np.ndarray)

@@ -41,4 +41,4 @@ edge = lg.plots.show(raw)
 #
 # .. code-block:: sh
 #
-#    lumigraph measure edge picture.tiff --region "100:180, 40:120" --pitch "5 um"
+#    lumigraph measure edge picture.tiff --region "100:180, 40:120" --pixel-pitch "5 um"

@@ -18,24 +18,36 @@ if TYPE_CHECKING:
     from typing import Any
 
 
+_RENAMED = {"view": "sub_aperture", "metric": "metrology"}
+"""Names of earlier versions."""
+
+_found: "dict[str, Any]" = {}
+
+
 def __getattr__(name: str) -> "Any":
     """Read `__init__.pyi` at the first name: until then nothing slow is imported, and Ctrl-C is quiet."""
-    import lazy_loader
+    if name in _RENAMED:
+        raise AttributeError(f"lumigraph.{name} is now called lumigraph.{_RENAMED[name]}.")
+    if not _found:
+        import lazy_loader
 
-    names = ("__getattr__", "__dir__", "__all__")
-    found: dict[str, Any] = dict(zip(names, lazy_loader.attach_stub(__name__, __file__), strict=True))
-    globals().update(found)
-    return found[name] if name in found else found["__getattr__"](name)
+        names = ("__getattr__", "__dir__", "__all__")
+        _found.update(zip(names, lazy_loader.attach_stub(__name__, __file__), strict=True))
+    return _found[name] if name in _found else _found["__getattr__"](name)
 
 
 def __dir__() -> list[str]:
     return __getattr__("__all__")
 
 
-def _describe() -> "Any":
+def _imported(module: str) -> "Any":
     from importlib import import_module
 
-    return import_module("lumigraph.describe")
+    return import_module(f"lumigraph.{module}")
 
 
-upper_floors.register(plots=lambda: __getattr__("plots"), describe=_describe)
+upper_floors.register(
+    plots=lambda: __getattr__("plots"),
+    describe=lambda: _imported("describe"),
+    cameras=lambda: _imported("instruments"),
+)

@@ -2,15 +2,29 @@
 
 from . import (
     analysis as analysis,
+    calibration as calibration,
     cluster as cluster,
+    deconvolution as deconvolution,
     depth as depth,
     design as design,
+    elements as elements,
+    instruments as instruments,
+    io as io,
     metrology as metrology,
+    operators as operators,
     plots as plots,
+    preparation as preparation,
+    propagation as propagation,
+    rendering as rendering,
     samples as samples,
+    scene as scene,
+    sensor as sensor,
+    simulation as simulation,
+    studies as studies,
+    testing as testing,
     units as units,
+    viewer as viewer,
 )
-from .studies import adaptive as adaptive, information as information, tolerance as tolerance
 from .calibration import calibrate as calibrate, devignette as devignette
 from .core.calibration import Calibration as Calibration
 from .core.cloud import PointCloud as PointCloud
@@ -51,6 +65,12 @@ from .instruments import (
 )
 from .metrology.scanning import find_shifts as find_shifts, joint_operator as joint_operator, scan as scan
 from .io import contents as contents, open as open, save as save
+from .studies import (
+    adaptive as adaptive,
+    information as information,
+    optimisation as optimisation,
+    tolerance as tolerance,
+)
 from .studies.optimisation import Goal as Goal, optimise as optimise
 from .preparation import (
     PreparedImage as PreparedImage,
@@ -74,7 +94,7 @@ from .rendering import (
     refocus as refocus,
     refocus_fourier as refocus_fourier,
     refocus_stack as refocus_stack,
-    view as view,
+    sub_aperture as sub_aperture,
     view_path as view_path,
 )
 from .scene import (
@@ -97,6 +117,6 @@ from .simulation import (
     TiltedWaves as TiltedWaves,
     simulate as simulate,
 )
-from .viewer import view_inline as view_inline
+from .viewer import show as show, view_inline as view_inline
 
 __version__: str

@@ -1,7 +1,8 @@
 """Units as plain floats, and a parser for quantities written with their unit.
 
 Everything inside lumigraph is in SI: metres, radians, seconds. A unit is the number to multiply by,
-so ``50*mm`` is ``0.05``; files and the command line write ``"50 mm"``, which `parse` reads.
+so ``50*mm`` is ``0.05``; files and the command line write ``"50 mm"``, which `parse` reads, and ranges
+``"40 mm:60 mm:5 mm"``, which `spaced` reads. Python takes both: `metres` converts what a user gives.
 """
 
 import math
@@ -103,3 +104,93 @@ def parse(text: str | float, dimension: str = "length") -> float:
         article = "an" if dimension[0] in "aeiou" else "a"
         raise FormatError(f"{text!r} is not {article} {dimension}. {hint}")
     return float(Decimal(match[1]) * Decimal(repr(size)))  # 200 * 1e-6 is not 2e-4
+
+
+MOST_VALUES = 1000
+"""Values of a range, unless its user takes more."""
+
+RANGE = "first:last:step, such as '-20 um:20 um:2 um', or first:last:xN, such as 0.9:1.1:x9"
+"""The two forms of a range, for messages."""
+
+
+def spaced(text: str, option: str = "the range", most: int = MOST_VALUES) -> tuple[list[float], str]:
+    """Values of a range in its unit, and that unit.
+
+    Parameters
+    ----------
+    text
+        ``first:last:step``, with the step's own unit, or ``first:last:xN`` for N values, of which one stands
+        in the middle. The last value is left out where no whole number of steps leads to it.
+    option
+        What errors call it, such as ``"--depth"``.
+    most
+        Values that are taken at most.
+
+    Raises
+    ------
+    FormatError
+        Another form, units of two dimensions, a step that leads away from the last value, or too many values.
+
+    Examples
+    --------
+    >>> spaced("-20 um:20 um:10 um")
+    ([-20.0, -10.0, 0.0, 10.0, 20.0], 'um')
+    >>> spaced("0.9:1.1:x3"), spaced("4 mm:5 mm:500 um")
+    (([0.9, 1.0, 1.1], ''), ([4.0, 4.5, 5.0], 'mm'))
+    """
+    words = [word.strip() for word in text.split(":")] if len(text) <= 3 * _LONGEST else []
+    if len(words) != 3:
+        raise FormatError(f"{option} is {text[:60]!r} but must be {RANGE}.")
+    number = re.fullmatch(r"x\s*(\d{1,9})", words[2])
+    found = [_QUANTITY.fullmatch(word) for word in (words[:2] if number else words)]
+    if any(one is None or not math.isfinite(float(one[1])) for one in found):
+        raise FormatError(f"{option} is {text[:60]!r} but must be {RANGE}, in finite numbers.")
+    parts = [(Decimal(one[1]), one[2]) for one in found if one]
+    unit = next((name for _, name in parts if name), "")
+    if number is None:
+        _check_step(option, words, parts, unit)
+    values = [size * _ratio(name, unit, f"{option} {text!r}") if size else size for size, name in parts]
+    count = int(number[1]) if number else _steps(values, f"{option} {text!r}")
+    if not 1 <= count <= most:
+        raise FormatError(f"{option} {text!r} asks for {count} values but must have 1 to {most}.")
+    first, last = values[:2]
+    if number is None:
+        return [float(first + k * values[2]) for k in range(count)], unit
+    if count == 1:
+        return [float((first + last) / 2)], unit
+    return [float(first + (last - first) * k / (count - 1)) for k in range(count)], unit
+
+
+def _check_step(option: str, words: list[str], parts: list[tuple[Decimal, str]], unit: str) -> None:
+    """Refuse a third number that could be a count: it was one in earlier versions."""
+    ends, last = f"{words[0]}:{words[1]}", words[2]
+    if unit and not parts[2][1]:
+        raise FormatError(
+            f"{option} {':'.join(words)!r} has a step without a unit. Write '{ends}:x{last}' for a count, "
+            f"or '{ends}:{last} {unit}' for a step."
+        )
+    if not unit and last.isdecimal():
+        raise FormatError(
+            f"{option} {':'.join(words)!r} does not say whether {last} is a count or a step. "
+            f"Write '{ends}:x{last}' for a count, or '{ends}:{last}.0' for a step."
+        )
+
+
+def _ratio(name: str, unit: str, written: str) -> Decimal:
+    """Size of one unit in another."""
+    if name == unit:
+        return Decimal(1)
+    known, other = _UNITS.get(name), _UNITS.get(unit)
+    if known is None or other is None or known[0] != other[0]:
+        raise FormatError(f"{written} has the units {name!r} and {unit!r}. Give all parts in one.")
+    return Decimal(repr(known[1])) / Decimal(repr(other[1]))
+
+
+def _steps(values: list[Decimal], written: str) -> int:
+    """Number of values from the first to the last by a step."""
+    first, last, step = values
+    if float(step) == 0 or (last - first) * step < 0:
+        raise FormatError(
+            f"{written} must lead from its first to its last value: its step is {float(step):g}."
+        )
+    return int(min(float(last - first) / float(step), 1e15) * (1 + 1e-9)) + 1

@@ -93,7 +93,7 @@ def test_without_saturation_or_exposure_times_what_they_tell_is_left_out(rng):
 def test_bare_arrays_saturate_where_told(rng):
     arrays = [[each.data for each in pair(SENSOR, light, rng)] for light in (0.3, 0.5, 1.2)]
     dark = [each.data for each in pair(SENSOR, 0.0, rng)]
-    assert photon_transfer(arrays, [dark], highest=4095).full_well == pytest.approx(11990, rel=0.02)
+    assert photon_transfer(arrays, [dark], full_scale=4095).full_well == pytest.approx(11990, rel=0.02)
 
 
 def test_dark_noise_finer_than_the_numbers_warns(rng):

@@ -62,7 +62,7 @@ def test_beads_are_deconvolved_with_their_aberration(lumigraph, tmp_path):
     light = 3000 * bent.point_image(3e-6, -4e-6, 8e-6, accuracy=3e-2)
     raw = np.random.default_rng(0).poisson(light + 1).astype(np.float32)
     tifffile.imwrite(tmp_path / "raw.tif", raw)
-    depths = ("--z", "0 um:16 um:4 um")
+    depths = ("--depth", "0 um:16 um:4 um")
     given = ("deconvolve", "raw.tif", "--camera", "scope.toml", "--background", "1", *depths)
     done = ("--iterations", "3", "--samples", "3", "--json", "--report", "page.html", "-o", "volume.h5")
     found = lumigraph(*given, "--adaptive", "--terms", "6", "--object", "beads", *done)

@@ -251,7 +251,7 @@ def test_decode_and_refocus(lumigraph, bench):
 
 def test_refocus_writes_stacks_and_folders(lumigraph, bench):
     lumigraph("decode", "raw.tiff", "--white", "white.tiff", "-o", "views.zarr")
-    result = lumigraph("refocus", "views.zarr", "--alphas", "0.9:1.1:3", "-o", "stack.tiff", "--json")
+    result = lumigraph("refocus", "views.zarr", "--alphas", "0.9:1.1:x3", "-o", "stack.tiff", "--json")
     assert json.loads(result.out)["alphas"] == pytest.approx([0.9, 1.0, 1.1])
     pages = [io.open("stack.tiff", page=k).data for k in range(3)]
     assert lumigraph("refocus", "views.zarr", "--alpha", "0.9", "--alpha", "1.1", "-o", "folder").code == 0

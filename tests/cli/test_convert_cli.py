@@ -34,7 +34,7 @@ def files(tmp_path, measured):
 
 @pytest.mark.parametrize(("form", "array"), [("compote", "hex"), ("lftoolbox", "square")])
 def test_a_measured_camera_goes_to_another_program_and_comes_back(lumigraph, files, measured, form, array):
-    words = ["--calibration", f"{array}.toml", "--to", form, "--views", 9, "--distance", "0.3 m"]
+    words = ["--calibration", f"{array}.toml", "--to", form, "--directions", 9, "--distance", "0.3 m"]
     result = lumigraph("convert", "camera.json", *words, "-o", "theirs.json", "--json")
     assert result.code == 0, result.err
     told = " ".join(json.loads(result.out)["notes"])
@@ -66,7 +66,10 @@ def test_a_calibration_goes_to_raytrix(lumigraph, files):
         ),
         (["hex.toml", "--to", "compote", "-o", "a.json"], "holds no lengths of a camera"),
         (["hex.toml", "-o", "a.json"], "has the wrong extension"),
-        (["camera.json", "--calibration", "hex.toml", "--to", "lftoolbox", "-o", "a.json"], "Give --views 9"),
+        (
+            ["camera.json", "--calibration", "hex.toml", "--to", "lftoolbox", "-o", "a.json"],
+            "Give --directions 9",
+        ),
     ],
 )
 def test_what_is_missing_is_named(lumigraph, files, words, said):

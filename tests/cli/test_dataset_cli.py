@@ -13,7 +13,7 @@ from lumigraph.cli import main
 from lumigraph.samples import Draws
 from lumigraph.samples.drawn import LAYOUTS
 
-DEPTHS = ["--z", "-6 mm:6 mm:6 mm"]
+DEPTHS = ["--depth", "-6 mm:6 mm:6 mm"]
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +146,7 @@ def test_what_cannot_be_is_refused(said, why, camera, tmp_path, capsys):
 
 
 def test_accuracies_that_no_microscope_has_are_refused(tmp_path, capsys):
-    words = ["dataset", "lfm-guv", "-n", "1", "--z", "0 um", "--accuracy", "0.2"]
+    words = ["dataset", "lfm-guv", "-n", "1", "--depth", "0 um", "--accuracy", "0.2"]
     assert main([*words, "-o", str(tmp_path / "t.zarr")]) == 1
     assert "accuracy is 0.2 but must be from 1e-5 to 0.1" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

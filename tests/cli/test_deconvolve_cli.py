@@ -10,8 +10,8 @@ import tifffile
 from scipy.ndimage import gaussian_filter
 
 import lumigraph as lg
-from lumigraph.cli.deconvolve_options import depths
 from lumigraph.cli.frames import Frames, items_of
+from lumigraph.cli.options import planes
 from lumigraph.operators.microscope.volume_operator import MicroscopeOperator
 from lumigraph.preparation import vignetting
 
@@ -165,7 +165,7 @@ def test_a_microscope_gives_a_volume_with_its_places(lumigraph, tmp_path):
     lg.save(lg.RawImage(np.full(light.shape, 10, np.float32)), tmp_path / "dark.tif")
     found = lumigraph(
         "deconvolve", "raw.tif", "--dark", "dark.tif", "--camera", "scope.toml", "--iterations", 15,
-        "--z", "-10 um:10 um:10 um", "-o", "volume.ome.tif", "--report", "page.html", "--raw-lattice",
+        "--depth", "-10 um:10 um:10 um", "-o", "volume.ome.tif", "--report", "page.html", "--raw-lattice",
     )  # fmt: skip
     assert found.code == 0, found.err
     volume = lg.open(tmp_path / "volume.ome.tif")
@@ -177,9 +177,9 @@ def test_a_microscope_gives_a_volume_with_its_places(lumigraph, tmp_path):
 
 
 def test_depths_are_read_with_their_ends():
-    assert depths("--z", "-20 um:20 um:2 um") == pytest.approx(np.arange(-20e-6, 21e-6, 2e-6))
-    assert depths("--z", "5 um") == pytest.approx((5e-6,))
-    assert depths("--z", "5 um, -1 um") == pytest.approx((-1e-6, 5e-6))
+    assert planes("--depth", "-20 um:20 um:2 um") == pytest.approx(np.arange(-20e-6, 21e-6, 2e-6))
+    assert planes("--depth", "5 um") == pytest.approx((5e-6,))
+    assert planes("--depth", "5 um, -1 um") == pytest.approx((-1e-6, 5e-6))
 
 
 def test_vignetting_is_what_a_white_image_shows_over_many_lenslets():
@@ -195,11 +195,11 @@ def test_vignetting_is_what_a_white_image_shows_over_many_lenslets():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--z", "1 um:2 um"), "'first:last:step'"),
-        (("--z", "2 um:1 um:1 um"), "must ascend"),
-        (("--z", "0 um:1 m:1 nm"), "at most 1000"),
-        (("--z", "1 um, 1 um"), "names a depth twice"),
-        (("--z", "3"), "--z"),
+        (("--depth", "1 um:2 um"), "must be first:last:step"),
+        (("--depth", "2 um:1 um:1 um"), "must ascend"),
+        (("--depth", "0 um:1 m:1 nm"), "must have 1 to 1000"),
+        (("--depth", "1 um, 1 um"), "names a depth twice"),
+        (("--depth", "3"), "--depth"),
         (("--samples", "0"), "--samples is 0"),
         (("--iterations", "0"), "--iterations is 0"),
         (("--strength", "0.1"), "--strength needs a prior"),
@@ -235,7 +235,7 @@ def test_what_a_microscope_would_see_can_be_simulated_and_deconvolved(lumigraph,
     )  # fmt: skip
     assert found.code == 0, found.err
     found = lumigraph(
-        "deconvolve", "raw.tiff", "--camera", "scope.toml", "--z", "-5 um, 10 um", "--iterations", 2,
+        "deconvolve", "raw.tiff", "--camera", "scope.toml", "--depth", "-5 um, 10 um", "--iterations", 2,
         "-o", "volume.ome.tif",
     )  # fmt: skip
     assert found.code == 0, found.err
@@ -261,7 +261,16 @@ def test_a_batch_warms_up_in_runs_that_are_the_same_whoever_does_them(here, lumi
     (tmp_path / "scope.toml").write_text(SCOPE)
     film = rng.poisson(200, (3, 41, 41)).astype(np.uint16)
     tifffile.imwrite(tmp_path / "film.tif", film, photometric="minisblack")
-    asked = ["film.tif", "--camera", "scope.toml", "--z=-10 um,0 um", "--samples", "1", "--iterations", "2"]
+    asked = [
+        "film.tif",
+        "--camera",
+        "scope.toml",
+        "--depth=-10 um,0 um",
+        "--samples",
+        "1",
+        "--iterations",
+        "2",
+    ]
     batch = ["batch", "deconvolve", *asked, "--warm", "--run", "2", "--workers", "1"]
     found = lumigraph(*batch, "-o", "v.ome.zarr")
     assert found.code == 0, found.err
@@ -289,7 +298,7 @@ def test_frames_of_a_batch_that_share_products_are_what_the_verb_alone_gives(
     film = rng.poisson(200, (6, 41, 41)).astype(np.uint16)
     film[1] = 0
     tifffile.imwrite(tmp_path / "film.tif", film, photometric="minisblack")
-    asked = ["--camera", "scope.toml", "--z=-10 um,0 um", "--samples", "1", "--iterations", "2"]
+    asked = ["--camera", "scope.toml", "--depth=-10 um,0 um", "--samples", "1", "--iterations", "2"]
     monkeypatch.setattr(MicroscopeOperator, "side_by_side", property(lambda _: 3))
     monkeypatch.chdir(tmp_path)
     work, (first, *others) = Frames("deconvolve", tuple(asked), str(tmp_path)), items_of(["film.tif"], "all")

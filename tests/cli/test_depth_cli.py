@@ -75,7 +75,7 @@ def test_the_focal_stack_of_fused_suits_views_far_apart(lumigraph, views, tmp_pa
 
     suited = error()
     assert suited < 0.006
-    assert error("--alphas", "0.9:1.1:21") > 1.1 * suited  # planes a pixel per view apart
+    assert error("--alphas", "0.9:1.1:x21") > 1.1 * suited  # planes a pixel per view apart
 
 
 @pytest.mark.parametrize(("method", "shape"), [("correlation", (8, 9)), ("dense", (31, 35))])
@@ -89,7 +89,7 @@ def test_patches_of_a_raw_image(lumigraph, tmp_path, method, shape):
     lg.save(lg.RawImage(raw.astype(np.float32)), tmp_path / "raw.tiff")
     lg.save(lg.Calibration(lattice, raw.shape, none.astype(int), none, 0.0), tmp_path / "camera.toml")
     words = ("depth", "raw.tiff", "--calibration", "camera.toml", "--method", method, "-o", "map.tiff")
-    found = lumigraph(*words, "--between", "2:6", "--smooth", 1, "--json")
+    found = lumigraph(*words, "--range", "2:6", "--smooth", 1, "--json")
     assert found.code == 0, found.err
     assert json.loads(found.out)["median"] == pytest.approx(4.0, abs=0.1)
     assert tuple(json.loads(found.out)["shape"]) == shape
@@ -109,8 +109,8 @@ def test_wrong_words_are_told_in_one_line(lumigraph, views):
     for words, told in (
         (("-o", "map.obj"), "wrong extension"),
         (("-o", "map.ply"), "points need the camera's lengths"),
-        (("-o", "map.tiff", "--between", "1"), "must be least:most, such as -2:3"),
-        (("-o", "map.tiff", "--between", "2:1"), "the first must be less"),
+        (("-o", "map.tiff", "--range", "1"), "must be least:most, such as -2:3"),
+        (("-o", "map.tiff", "--range", "2:1"), "the first must be less"),
         (("-o", "map.tiff", "--method", "correlation"), "is for raw images of cameras 2.0"),
         (("-o", "map.tiff", "--white", "white.png"), "holds views, which need no --calibration"),
         (("-o", "map.tiff", "--correct"), "--correct simulates a camera"),

@@ -22,7 +22,7 @@ PROGRAM = [sys.executable, "-c", "import sys; from lumigraph.cli import main; sy
 def test_an_output_is_overwritten_by_a_success_only(lumigraph, bench):
     assert lumigraph("calibrate", "white.tiff", "-o", "c.toml").code == 0
     before = (bench / "c.toml").read_bytes()
-    assert lumigraph("calibrate", "raw.tiff", "-o", "c.toml", "--pitch", "40").code == 1
+    assert lumigraph("calibrate", "raw.tiff", "-o", "c.toml", "--pitch", "40", "--overwrite").code == 1
     assert (bench / "c.toml").read_bytes() == before
     assert lumigraph("calibrate", "white.tiff", "-o", "c.toml", "--pixel-pitch", "5 um").code == 0
     assert (bench / "c.toml").read_bytes() != before

@@ -12,7 +12,7 @@ def test_a_table_of_bounds_is_printed_and_a_report_written(tmp_path, capsys):
     words = [
         "information",
         "lfm-fourier",
-        "--depths",
+        "--depth",
         "-10 um:10 um:10 um",
         "--photons",
         "5000",
@@ -36,10 +36,10 @@ def test_a_table_of_bounds_is_printed_and_a_report_written(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--depths", "nan um"], "depths"),
-        (["--depths", "1 um", "--photons", "-3"], "photons"),
-        (["--depths", "1 um", "--background", "nan"], "background"),
-        (["--depths", "1 um", "--places", "0"], "places"),
+        (["--depth", "nan um"], "depths"),
+        (["--depth", "1 um", "--photons", "-3"], "photons"),
+        (["--depth", "1 um", "--background", "nan"], "background"),
+        (["--depth", "1 um", "--places", "0"], "places"),
     ],
 )
 def test_nonsense_is_refused(capsys, words, said):

@@ -40,7 +40,7 @@ def test_an_edge_of_one_pixel_has_the_mtf_of_a_pixel(lumigraph, folder):
     assert values == found(lumigraph("measure", "edge", "edge.tiff", "--region", "0-79:10-79", "--json"))
     assert values["mtf50"] == pytest.approx(0.603 / 4e-6, rel=0.02)
     assert values["angle"] == pytest.approx(np.degrees(np.arctan(0.1)), abs=0.05)
-    other = found(lumigraph("measure", "edge", "edge.tiff", "--pitch", "8 um", "--json"))
+    other = found(lumigraph("measure", "edge", "edge.tiff", "--pixel-pitch", "8 um", "--json"))
     assert other["mtf50"] == pytest.approx(0.603 / 8e-6, rel=0.02)
 
 

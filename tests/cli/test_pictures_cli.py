@@ -32,7 +32,6 @@ def test_pictures_and_maps_of_a_container_are_written(lumigraph, tmp_path, conta
     ("words", "message"),
     [
         (("-o", "a.zarr"), "holds no raw image but pictures (stack, lut, depth, confidence)"),
-        (("-o", "no/out"), "the folder no for out does not exist"),
         (("-o", "out", "--calibration", "a.toml"), "need neither --calibration nor --white"),
     ],
 )

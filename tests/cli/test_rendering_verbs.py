@@ -91,7 +91,7 @@ def test_refocus_by_depth_and_as_a_film(lumigraph, views):
     stack = io.open("two.tiff")
     assert isinstance(stack, Stack)
     assert stack.positions == pytest.approx([camera.alpha(-5e-3), camera.alpha(5e-3)])
-    words = ("--alphas", "0.8:1.2:5", "--shape", "ring", "--interpolation", "band_limited")
+    words = ("--alphas", "0.8:1.2:x5", "--aperture-shape", "ring", "--interpolation", "band_limited")
     assert lumigraph("refocus", "views.zarr", *words, "-o", "sweep.gif").code == 0
     from PIL import Image
 
@@ -100,7 +100,7 @@ def test_refocus_by_depth_and_as_a_film(lumigraph, views):
 
 
 def test_render_views_sharp_all_over(lumigraph, views):
-    words = ("--all-in-focus", "--alphas", "0.7:1.4:15", "--map", "alpha.tiff", "--json")
+    words = ("--all-in-focus", "--alphas", "0.7:1.4:x15", "--map", "alpha.tiff", "--json")
     result = lumigraph("render", "views.zarr", *words, "-o", "sharp.tiff")
     values = json.loads(result.out)
     assert values["alpha"][0] < 0.85 < 1.25 < values["alpha"][1]
@@ -114,7 +114,7 @@ def test_render_views_sharp_all_over(lumigraph, views):
 
 
 def test_render_moves_the_point_of_view(lumigraph, views):
-    words = ("--path", "eight", "--frames", "6", "--radius", "1", "--still", "0.8", "--json")
+    words = ("--path", "eight", "--frames", "6", "--radius", "1", "--pivot", "0.8", "--json")
     result = lumigraph("render", "views.zarr", *words, "-o", "look.tiff")
     assert json.loads(result.out)["frames"] == 6
     assert len(io.open("look.tiff")) == 6
@@ -133,7 +133,7 @@ def test_render_finds_the_patches(lumigraph, focused):
 
 
 def test_render_planes_and_finer(lumigraph, focused):
-    words = ("--camera", "focused.toml", "--patches", "8:11:4", "--samples", "6")
+    words = ("--camera", "focused.toml", "--patches", "8:11:x4", "--samples", "6")
     assert lumigraph("render", "focused.tiff", *words, "-o", "planes.tiff").code == 0
     stack = io.open("planes.tiff")
     assert stack.positions == (8, 9, 10, 11)
@@ -142,7 +142,7 @@ def test_render_planes_and_finer(lumigraph, focused):
     fine = lumigraph("render", "focused.tiff", *words, "-o", "b.tiff", "--json")
     ratio = np.divide(json.loads(fine.out)["shape"], json.loads(plain.out)["shape"])
     np.testing.assert_allclose(ratio, 19 / 9, rtol=0.05)
-    assert lumigraph("render", "focused.tiff", *words, "--smoothness", "1", "-o", "c.tiff").code == 0
+    assert lumigraph("render", "focused.tiff", *words, "--smooth", "1", "-o", "c.tiff").code == 0
     rough, smooth = (np.abs(np.diff(io.open(name).data, axis=1)).mean() for name in ("b.tiff", "c.tiff"))
     assert smooth < 0.8 * rough
 
@@ -167,18 +167,18 @@ def test_render_planes_and_finer(lumigraph, focused):
         (("render", "views.zarr", "--path", "line", "--radius", "2", "-o", "o.gif"), ["--radius is 2"]),
         (("render", "raw.tiff", "--path", "circle", "-o", "o.gif"), ["raw image", "decode"]),
         (("render", "raw.tiff", "--patch", "5", "--map", "m.tiff", "-o", "o.png"), ["--map", "auto"]),
-        (("render", "raw.tiff", "--patch", "5", "--patches", "4:6:3", "-o", "o.tiff"), ["--patch", "one"]),
+        (("render", "raw.tiff", "--patch", "5", "--patches", "4:6:x3", "-o", "o.tiff"), ["--patch", "one"]),
         (("render", "raw.tiff", "--patch", "5", "--finer", "9", "-o", "o.png"), ["--finer is 9"]),
         (
-            ("render", "raw.tiff", "--patch", "5", "--smoothness", "0.1", "-o", "o.png"),
-            ["--smoothness is 0.1", "--finer"],
+            ("render", "raw.tiff", "--patch", "5", "--smooth", "0.1", "-o", "o.png"),
+            ["--smooth is 0.1", "--finer"],
         ),
         (
             ("render", "raw.tiff", "--patch", "5", "--finer", "2", "--blend", "-o", "o.png"),
             ["--finer", "--blend"],
         ),
         (("render", "raw.tiff", "--patch", "5", "--focus", "1,x", "-o", "o.tiff"), ["--focus is '1,x'"]),
-        (("render", "raw.tiff", "--patches", "4:x:3", "-o", "o.tiff"), ["--patches", "first:last:count"]),
+        (("render", "raw.tiff", "--patches", "4:x:3", "-o", "o.tiff"), ["--patches", "first:last:xN"]),
     ],
 )
 def test_contradictions_are_refused_in_one_line(lumigraph, views, words, parts):

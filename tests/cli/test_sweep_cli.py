@@ -8,7 +8,7 @@ import lumigraph as lg
 from lumigraph.cli import main
 
 CAMERA = "thesis-plenoptic-2-m050"
-FOCAL = "lenslets.focal_length=4 mm:6 mm:3"
+FOCAL = "lenslets.focal_length=4 mm:6 mm:x3"
 
 
 def table(path):
@@ -87,16 +87,16 @@ def test_what_no_camera_can_have_is_a_row_with_the_reason(here, tmp_path, capsys
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--vary", "lenslets.focal=4 mm:6 mm:3"], "Did you mean 'lenslets.focal_length'"),
+        (["--vary", "lenslets.focal=4 mm:6 mm:x3"], "Did you mean 'lenslets.focal_length'"),
         (["--vary", "lenslets.focal_length=4,5"], "has no unit"),
-        (["--vary", "lenslets.focal_length=4 mm:6 um:3"], "has two units"),
-        (["--vary", "lenslets.focal_length=4 mm:6 mm"], "first:last:count"),
-        (["--vary", "lenslets.focal_length=4 mm:6 mm:0"], "a count from 1"),
+        (["--vary", "lenslets.focal_length=4 mm:6 deg:x3"], "has the units 'deg' and 'mm'"),
+        (["--vary", "lenslets.focal_length=4 mm:6 mm"], "first:last:xN"),
+        (["--vary", "lenslets.focal_length=4 mm:6 mm:x0"], "must have 1 to 100000"),
         (["--vary", "lenslets.focal_length"], "must be like"),
         (["--vary", "wavelength.a=1"], "which has no parts"),
         (["--vary", FOCAL, "--vary", FOCAL], "names a key twice"),
         (["--vary", FOCAL, "--measure", "view per axis"], "Did you mean 'views per axis'"),
-        (["--vary", "a=0:1:1000", "--vary", "b=0:1:1000"], "1000000 combinations"),
+        (["--vary", "a=0:1:x1000", "--vary", "b=0:1:x1000"], "1000000 combinations"),
         (["--vary", FOCAL, "--workers", "0"], "--workers is 0"),
         ([], "--vary"),
     ],

@@ -244,5 +244,5 @@ def test_wave_optics_of_two_planes_and_a_slanted_one(lenslets, planes, divide):
     above = y[:, 0] < -0.1e-3
     wrong = (np.asarray(found.values)[above] > 0.75e-3) != (x > 0)
     assert wrong.sum(1).max() <= 2
-    points = cloud(found, calibration, object_distance=0.12, lowest=0.0, grid=grid)
+    points = cloud(found, calibration, object_distance=0.12, min_confidence=0.0, grid=grid)
     assert np.ptp(points.points[:, 2]) == pytest.approx(np.ptp(x), rel=0.05)

@@ -293,7 +293,7 @@ LIGHT = LightField(np.ones((2, 2, 2, 2)), Grid.square(2, 1.0), Grid.square(2, 1.
             "a.png",
             "wrong extension for this result, a LightField. Use one of _eslf.png, .eslf.png, .zarr",
         ),
-        (np.ones((2, 2)), "a.toml", "Use one of .tif, .tiff, .png, .zarr, .zarr.zip"),
+        (np.ones((2, 2)), "a.toml", "Use one of .tif, .tiff, .png, .jpg, .jpeg, .zarr, .zarr.zip"),
         ([np.ones((2, 2))], "a.png", "Use one of .tif, .tiff"),
         ([], "a.tiff", "no pictures"),
         ([np.ones((2, 2)), np.ones((2, 3))], "a.tiff", "have shapes .* but must have one"),
@@ -306,7 +306,8 @@ LIGHT = LightField(np.ones((2, 2, 2, 2)), Grid.square(2, 1.0), Grid.square(2, 1.
         ("hello", "a.png", "a str cannot be written"),
         (RawImage(np.ones((2, 2)), metadata={"f": open}), "a.tiff", r"metadata\['f'\] is a builtin"),
         (RawImage(np.ones((2, 2)), metadata={"f": [np.inf]}), "a.zarr", r"metadata\['f'\]\[0\] is inf"),
-        (np.ones((2, 2)), "nowhere/a.png", "the folder .*nowhere for a.png does not exist"),
+        (np.ones((2, 2), np.uint16), "a.jpg", "a JPEG holds 8 bits but the picture is uint16"),
+        (np.ones((1, 65536)), "a.jpg", "65535 pixels along an axis, not 65536"),
     ],
 )
 def test_what_no_format_holds_is_refused_and_leaves_nothing_behind(tmp_path, thing, name, message):

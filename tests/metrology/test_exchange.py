@@ -205,7 +205,7 @@ def rays_of(found, index):
 
 def test_rays_of_lftoolbox_are_those_of_the_camera(tmp_path):
     square = calibration(SQUARE)
-    lg.metrology.save_camera(FLAT, square, tmp_path / "a.json", "lftoolbox", views=9)
+    lg.metrology.save_camera(FLAT, square, tmp_path / "a.json", "lftoolbox", directions=9)
     found = json.loads((tmp_path / "a.json").read_text())
     index = RNG.integers(1, 10, (200, 4)) + np.array([0, 0, 6, 3])
     first = square.indices.min(0)
@@ -221,7 +221,7 @@ def test_rays_of_lftoolbox_are_those_of_the_camera(tmp_path):
 
 def test_distortion_of_lftoolbox_turns_rays_to_where_points_are(tmp_path):
     camera = replace(FLAT, radial=(0.3, -2.0, 5.0), tangential=(2e-3, -3e-3))
-    lg.metrology.save_camera(camera, calibration(SQUARE), tmp_path / "a.json", "lftoolbox", views=9)
+    lg.metrology.save_camera(camera, calibration(SQUARE), tmp_path / "a.json", "lftoolbox", directions=9)
     k1, k2, k3, *middle = json.loads((tmp_path / "a.json").read_text())["EstCamDistortionV"]
     seen = RNG.uniform(-0.04, 0.04, (50, 2))
     from_middle = seen - middle
@@ -238,7 +238,9 @@ def test_distortion_of_lftoolbox_turns_rays_to_where_points_are(tmp_path):
 def test_a_camera_comes_back_from_lftoolbox(tmp_path):
     camera = replace(FLAT, radial=(0.3, -2.0, 5.0), tangential=(2e-3, -3e-3))
     straight = replace(SQUARE, basis=compote_basis(SQUARE))
-    notes = lg.metrology.save_camera(camera, calibration(straight), tmp_path / "a.json", "lftoolbox", views=9)
+    notes = lg.metrology.save_camera(
+        camera, calibration(straight), tmp_path / "a.json", "lftoolbox", directions=9
+    )
     again, found = lg.metrology.load_camera(tmp_path / "a.json")
     assert np.allclose(again.numbers, camera.numbers, rtol=1e-9, atol=1e-10)
     assert found.shape == SHAPE
@@ -251,13 +253,13 @@ def test_a_camera_comes_back_from_lftoolbox(tmp_path):
 def test_what_lftoolbox_cannot_hold_is_named(tmp_path):
     path = tmp_path / "a.json"
     odd = replace(CAMERA, radial=(0.0, 0.0, 0.0))
-    notes = lg.metrology.save_camera(odd, calibration(SQUARE), path, "lftoolbox", views=9)
+    notes = lg.metrology.save_camera(odd, calibration(SQUARE), path, "lftoolbox", directions=9)
     told = " / ".join(notes)
     for word in ("uncertainties", "tangential", "tilt (0.6, -0.9 mrad)", "3 kinds", "shear"):
         assert word in told
     with pytest.raises(FormatError, match="the lattice is hexagonal"):
-        lg.metrology.save_camera(CAMERA, calibration(HEX), path, "lftoolbox", views=9)
-    with pytest.raises(FormatError, match="Give views=9"):
+        lg.metrology.save_camera(CAMERA, calibration(HEX), path, "lftoolbox", directions=9)
+    with pytest.raises(FormatError, match="Give directions=9"):
         lg.metrology.save_camera(FLAT, calibration(SQUARE), path, "lftoolbox")
     with pytest.raises(FormatError, match="form is 'ini' but must be one of compote, lftoolbox"):
         lg.metrology.save_camera(FLAT, calibration(SQUARE), path, "ini")
@@ -275,7 +277,7 @@ def test_what_lftoolbox_cannot_hold_is_named(tmp_path):
 )
 def test_damaged_files_of_lftoolbox_are_named(tmp_path, key, value, message):
     path = tmp_path / "a.json"
-    lg.metrology.save_camera(FLAT, calibration(SQUARE), path, "lftoolbox", views=9)
+    lg.metrology.save_camera(FLAT, calibration(SQUARE), path, "lftoolbox", directions=9)
     path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
     with pytest.raises(FormatError) as raised:
         lg.metrology.load_camera(path)

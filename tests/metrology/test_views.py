@@ -248,7 +248,7 @@ def test_raw_images_of_a_camera_1_0_give_a_camera_by_one_command(tmp_path, capsy
         io.save(RawImage(drawn_views.raw(where, rng)), name)
     known = ["--focal-length", "50.5 mm", "--pixel-pitch", "5.5 um", "--board", "4 x 3 corners, 3.3 mm"]
     known += ["--wavelength", "1 nm"]  # rays spill nothing
-    files = ["--white", str(tmp_path / "white.tif"), "-o", str(tmp_path / "camera.json"), "--views"]
+    files = ["--white", str(tmp_path / "white.tif"), "-o", str(tmp_path / "camera.json"), "--in-views"]
     assert main(["board", *map(str, names), *known, *files, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["residual_px"] < 0.1 * drawn_views.PITCH

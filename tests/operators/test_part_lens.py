@@ -97,7 +97,7 @@ def test_a_mask_for_depth_is_found_downhill_as_by_a_simplex():
     goal = Goal("depth", depths=(-3 * mm, 2 * mm), light=light, places=1)
     start = camera().replace(main_lens={"aberrations": {6: 0.05}})
     best = [
-        lg.optimise(start, ["main_lens.aberrations.6=0.05:1:1"], goal, search=search, evaluations=25).best
+        lg.optimise(start, ["main_lens.aberrations.6=0.05:1:x1"], goal, search=search, evaluations=25).best
         for search in ("gradient", "local")
     ]
     assert best[0]["depth"] == pytest.approx(best[1]["depth"], rel=2e-3)

@@ -80,8 +80,8 @@ MISTAKES = {
     "points of text": (lambda: Points([("a", 0, 0)], [1]), "positions are .* but must be numbers"),
     "scene of one": (lambda: Scene(5), "parts are 5 but must be a list"),
     "scene moved": (
-        lambda: lg.targets.points([(0, 0)]).at("5 mm"),
-        "dz is '5 mm' but must be a finite number",
+        lambda: lg.targets.points([(0, 0)]).at("5 deg"),
+        "dz is '5 deg' but must be a finite number",
     ),
     "scene scaled": (lambda: lg.targets.white().scaled(None), "factor is None but must be a finite number"),
     "slice of a list": (lambda: Slice([[1.0]], GRID), "a slice is of type list but must be an array"),
@@ -117,7 +117,7 @@ MISTAKES = {
         "views is of type ndarray but must be a LightField",
     ),
     "stack of one": (lambda: lg.refocus_stack(VIEWS, 1.1), "alphas is 1.1 but must be a list of numbers"),
-    "view number": (lambda: lg.view(VIEWS, 0.5, 0), "v is 0.5 but must be a whole number"),
+    "view number": (lambda: lg.sub_aperture(VIEWS, 0.5, 0), "v is 0.5 but must be a whole number"),
     "aperture of an array": (
         lambda: lg.reduce_aperture(RAW, 0.5),
         "views is of type ndarray but must be a LightF",
@@ -134,8 +134,8 @@ MISTAKES = {
     "complex white": (lambda: lg.devignette(RAW, RAW + 0j), "the white image is complex. Give its intensity"),
     "no views": (lambda: plenoptic2.views_per_axis(0.0), "magnification is 0 but must not be"),
     "text distance": (
-        lambda: plenoptic2.magnification_at(0.06, "1 m", 0.1, 0.01),
-        "object_distance is '1 m' but must",
+        lambda: plenoptic2.magnification_at(0.06, "1", 0.1, 0.01),
+        "object_distance is '1' but must",
     ),
 }
 

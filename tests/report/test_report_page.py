@@ -116,10 +116,12 @@ def test_bad_tables_zooms_and_arrays_are_refused():
         section.figure(np.ones(3), "c")
 
 
-def test_writing_replaces_and_needs_the_folder(tmp_path, page):
+def test_writing_replaces_and_makes_the_folder(tmp_path, page):
     page.write(tmp_path / "r.html")
     page.write(tmp_path / "r.html")
     assert (tmp_path / "r.html").read_text("utf-8") == page.html()
     assert len(list(tmp_path.iterdir())) == 1
-    with pytest.raises(FormatError, match=r"folder .*nowhere for r.html does not exist"):
-        page.write(tmp_path / "nowhere" / "r.html")
+    page.write(tmp_path / "new" / "folder" / "r.html")
+    assert (tmp_path / "new" / "folder" / "r.html").exists()
+    with pytest.raises(FormatError, match=r"r.html is a file, not a folder for s.html"):
+        page.write(tmp_path / "r.html" / "s.html")

@@ -28,8 +28,8 @@ def folder(tmp_path, monkeypatch):
         ("design camera.toml", 1),
         ("simulate camera.toml --point '0 mm, 0 mm' -o point.tiff", 3),
         ("decode raw.tiff --calibration calibration.toml -o out.zarr", 4),
-        ("refocus views.zarr --alphas 0.9:1.1:3 -o stack.tiff", 3),
-        ("render views.zarr --all-in-focus --alphas 0.9:1.1:3 -o sharp.png", 2),
+        ("refocus views.zarr --alphas 0.9:1.1:x3 -o stack.tiff", 3),
+        ("render views.zarr --all-in-focus --alphas 0.9:1.1:x3 -o sharp.png", 2),
         ("depth views.zarr --method focus -o depth.tiff", 3),
     ],
 )

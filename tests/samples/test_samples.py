@@ -94,7 +94,7 @@ def test_the_caption_of_the_other_side_is_what_the_pictures_show():
     for columns, way, number in zip((slice(0, 27), slice(44, 71)), ways, numbers, strict=True):
         at = []
         for u in sides:
-            light = lg.view(views, views.data.shape[0] // 2, u)[20:50, columns]
+            light = lg.sub_aperture(views, views.data.shape[0] // 2, u)[20:50, columns]
             light = light - np.median(light[:3])
             at.append(float((light.sum(0) * np.arange(light.shape[1])).sum() / light.sum()))
         move = (at[1] - at[0]) * (1 if way == "right" else -1)

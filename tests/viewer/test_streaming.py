@@ -176,7 +176,7 @@ def test_only_tiles_of_what_is_seen_are_loaded(open_page, tmp_path):
         start = page.page.evaluate("lumigraph.app.main.finest.origin").copy()
         assert start == [0, 0]
         ny, nx = found.shape[:2]
-        assert np.abs(found - levels(lg.view(views, 2, 2))[:ny, :nx]).max() <= LEVELS
+        assert np.abs(found - levels(lg.sub_aperture(views, 2, 2))[:ny, :nx]).max() <= LEVELS
 
 
 def test_planes_of_volumes_are_finer_too(open_page, tmp_path, rng):

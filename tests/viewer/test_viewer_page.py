@@ -36,9 +36,9 @@ def test_pictures_are_those_of_the_library(open_page, views):
             small = lg.reduce_aperture(views, fraction, shape=shape)
             assert np.abs(page.pixels() - shown(lg.refocus(small, 0.95))).max() <= LEVELS
         page.set(aperture=0.001, shape="square", focus=1.0, view=[1, 3])
-        assert np.abs(page.pixels() - shown(lg.view(views, 1, 3))).max() <= LEVELS
+        assert np.abs(page.pixels() - shown(lg.sub_aperture(views, 1, 3))).max() <= LEVELS
         page.set(view=[1.25, 2.6])  # between views: the nearest, since a mean would show every edge twice
-        assert np.abs(page.pixels() - shown(lg.view(views, 1, 3))).max() <= LEVELS
+        assert np.abs(page.pixels() - shown(lg.sub_aperture(views, 1, 3))).max() <= LEVELS
 
 
 def test_between_views_what_is_in_focus_stays_and_has_every_edge_once(open_page, views):
@@ -224,7 +224,7 @@ def test_without_webgl_the_focal_stack_is_shown(open_page, views):
         assert alpha == pytest.approx(planes.positions[nearest])
         assert np.abs(page.pixels() - shown(planes.data[nearest])).max() <= LEVELS
         page.set(aperture=0.001, view=[0, 4])
-        assert np.abs(page.pixels() - shown(lg.view(views, 0, 4))).max() <= LEVELS
+        assert np.abs(page.pixels() - shown(lg.sub_aperture(views, 0, 4))).max() <= LEVELS
 
 
 def test_raw_images_show_every_pixel_and_volumes_their_planes(open_page, rng):
@@ -277,8 +277,8 @@ def test_a_quilt_has_the_views_from_left_to_right_from_the_bottom_up(open_page, 
         assert download.value.suggested_filename == "two planes_qs8x6a1.6.png"
         found = np.array(Image.open(io.BytesIO(download.value.path().read_bytes())))[..., :3].astype(float)
         assert found.shape == (6 * 40, 8 * 64, 3)
-        assert np.abs(found[-40:, :64] - shown(lg.view(views, 2, 0))).max() <= LEVELS
-        assert np.abs(found[:40, -64:] - shown(lg.view(views, 2, 4))).max() <= LEVELS
+        assert np.abs(found[-40:, :64] - shown(lg.sub_aperture(views, 2, 0))).max() <= LEVELS
+        assert np.abs(found[:40, -64:] - shown(lg.sub_aperture(views, 2, 4))).max() <= LEVELS
         assert page.state("aperture") == 1
 
 

@@ -51,3 +51,7 @@ __all__ = [
     "slanted_edge",
     "snr",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -87,7 +87,7 @@ def photon_transfer(
     darks: Sequence[Pair],
     *,
     exposure_times: Sequence[float] | None = None,
-    highest: float | None = None,
+    full_scale: float | None = None,
 ) -> PhotonTransfer:
     r"""Gain, noise, dark signal, full well and fixed patterns of a sensor.
 
@@ -108,7 +108,7 @@ def photon_transfer(
         Pairs without light. The first has the flats' exposure time; with `exposure_times` more may follow.
     exposure_times
         Of the darks [s], at least two different ones: they separate dark current from black level.
-    highest
+    full_scale
         Largest number that the sensor reads; None takes it from the bit depth of raw images, and without one
         looks for no saturation.
 
@@ -142,7 +142,7 @@ def photon_transfer(
         raise CalibrationError(
             f"there are {len(flats)} pairs of flats and {len(darks)} of darks. Give one of each."
         )
-    top = _highest(flats, highest)
+    top = _full_scale(flats, full_scale)
     lit, unlit = ([_moments(pair, top) for pair in pairs] for pairs in (flats, darks))
     _check_dark(darks[0], unlit[0])
     dark = unlit[0]
@@ -171,9 +171,9 @@ def photon_transfer(
     )  # fmt: skip
 
 
-def _highest(flats: Sequence[Pair], highest: float | None) -> float:
-    if highest is not None:
-        return checks.positive("highest", highest, "counts", CalibrationError)
+def _full_scale(flats: Sequence[Pair], full_scale: float | None) -> float:
+    if full_scale is not None:
+        return checks.positive("full_scale", full_scale, "counts", CalibrationError)
     depth = getattr(flats[0][0], "bit_depth", None)
     return math.inf if depth is None else float(2**depth - 1)
 

@@ -113,7 +113,7 @@ def contrast(profile: Array, frequency: float, pitch: float) -> float:
     0.5
     """
     values = np.asarray(to_numpy(profile), np.float64)
-    checks.positive("pitch", pitch)
+    pitch = checks.positive("pitch", pitch)
     checks.positive("frequency", frequency, "1/m")
     if len(values) * pitch * frequency < 1 - 1e-9 or frequency * pitch > 0.5:
         raise SamplingError(

@@ -63,7 +63,7 @@ def encircled_energy(
     >>> encircled_energy(np.ones((3, 3)), Grid.square(3, 1.0), 1.0)
     0.5555555555555556
     """
-    checks.positive("radius", radius)
+    radius = checks.positive("radius", radius)
     data = _checked(image, grid)
     y, x = centroid(data, grid) if center is None else center
     inside = (grid.y - y)[:, None] ** 2 + (grid.x - x) ** 2 <= radius**2 * (1 + 1e-12)

@@ -43,7 +43,7 @@ def mtf(psf: Array, pitch: float, axis: int = -1) -> tuple[np.ndarray, Array]:
     >>> frequencies.tolist(), values.round(9).tolist()
     ([0.0, 0.5, 1.0], [1.0, 0.0, 0.0])
     """
-    checks.positive("pitch", pitch)
+    pitch = checks.positive("pitch", pitch)
     data = np.asarray(to_numpy(psf))
     if data.ndim != 2 or axis not in (-1, -2):
         raise LumigraphError(

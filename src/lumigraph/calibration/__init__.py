@@ -22,3 +22,7 @@ from lumigraph.calibration.following import followed
 from lumigraph.calibration.lattice_fit import calibrate
 
 __all__ = ["Diagnosis", "aligned", "calibrate", "devignette", "diagnose", "exactly", "followed"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -31,7 +31,7 @@ from lumigraph.cli.design import design
 from lumigraph.cli.information import information
 from lumigraph.cli.measure import measure
 from lumigraph.cli.optimise import optimise
-from lumigraph.cli.options import COMMAND, PARAMETER, WARNED
+from lumigraph.cli.options import COMMAND, PARAMETER, RENAMED, WARNED
 from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
 from lumigraph.cli.reporting import telling
@@ -148,8 +148,23 @@ def _usage(error: CycloptsError) -> str:
         return _unknown(error.unused_tokens[0])
     verb = " ".join(error.command_chain or ())
     hint = f"lumigraph {verb} --help".replace("  ", " ")
-    text = (_missing(error, verb) if isinstance(error, MissingArgumentError) else str(error)).rstrip(".")
+    text = _renamed(COMMAND.get()) or (
+        _missing(error, verb) if isinstance(error, MissingArgumentError) else str(error)
+    )
+    text = text.rstrip(".")
     return f"{text}{'' if text.endswith('?') else '.'} Try '{hint}'."
+
+
+def _renamed(words: Sequence[str]) -> str | None:
+    """Message with the new name of an option that has another one now; None if there is no such option."""
+    if not words or words[0] not in {verb.__name__ for verb in VERBS}:
+        return None
+    known = {name for one in app[words[0]].assemble_argument_collection() for name in one.names}
+    for old in (word.partition("=")[0] for word in words):
+        new = next((name for name in RENAMED.get(old, ()) if name in known), None)
+        if new is not None and old not in known:
+            return f"{old} is now called {new}. Did you mean {new}?"
+    return None
 
 
 def _missing(error: MissingArgumentError, verb: str) -> str:

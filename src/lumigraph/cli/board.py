@@ -133,7 +133,7 @@ def board(
     board: Annotated[str | None, Parameter(name="--board")] = None,
     origin: RawOptions = NO_ORIGIN,
     known: KnownCamera = KnownCamera(),
-    views: Annotated[bool, Parameter(negative="")] = False,
+    in_views: Annotated[bool, Parameter(negative="")] = False,
     table: Path | None = None,
     pictures: Annotated[int, Parameter(allow_leading_hyphen=True)] = 8,
     output: Output | None = None,
@@ -142,8 +142,8 @@ def board(
     """Measure a plenoptic camera by a board of known size: its lengths, with their uncertainty.
 
     SOURCES are raw images of the board, three or more, in which the corners are found: behind the lenslets
-    of a camera 2.0, or in the views of a camera 1.0 (--views, or --camera of such a camera). All of the board
-    must be on each picture, but of ChArUco boards any six corners do. Finding boards needs OpenCV
+    of a camera 2.0, or in the views of a camera 1.0 (--in-views, or --camera of such a camera). All of the
+    board must be on each picture, but of ChArUco boards any six corners do. Finding boards needs OpenCV
     (pip install 'lumigraph[board]'), but for chessboards in views. Or SOURCES are one table (.csv) of where
     lenslets show them, with the columns frame, corner, y, x, center_y, center_x, kind, and in_views of a
     camera 1.0; or one folder of COMPOTE's (bap.csv, centers.csv, camera.json, scene.json), which also says
@@ -170,7 +170,7 @@ def board(
         dots, with their diameter unless it is half of the spacing: '11 x 4 dots, 10 mm, dots 4 mm'; or, with
         the way from row to row, '4 x 11 asymmetric dots, 10 mm'. Or a ChArUco board, by its inner corners
         (one less than squares): '9 x 6 charuco, 10 mm, markers 7 mm, DICT_4X4_50'.
-    views
+    in_views
         The raw images are of a camera 1.0, whose views show the corners.
     table
         File for the corners that were found on raw images (.csv).
@@ -189,7 +189,7 @@ def board(
     if sources == (Path("plan"),):
         return _planned(origin, target, known, pictures)
     seen, target, given, told = _read(
-        sources, target, origin, views, length("--wavelength", known.wavelength)
+        sources, target, origin, in_views, length("--wavelength", known.wavelength)
     )
     found = metrology.board(seen, target, known.nominal(given))
     written = [path for path in (output, table) if path is not None]

@@ -25,7 +25,7 @@ def convert(
     shape: tuple[int, int] | None = None,
     distance: str | None = None,
     f_number: float | None = None,
-    views: int | None = None,
+    directions: int | None = None,
     pixel_pitch: str | None = None,
     view_pitch: float | None = None,
     output: Output,
@@ -40,7 +40,7 @@ def convert(
 
     Example: `lumigraph convert camera.json --calibration white.toml --to compote -o intrinsics.json`
 
-    Example: `lumigraph convert camera.json --calibration white.toml --to lftoolbox --views 9 -o CalInfo.json`
+    Example: `lumigraph convert camera.json --calibration white.toml --to lftoolbox --directions 9 -o a.json`
 
     Example: `lumigraph convert intrinsics.json -o calibration.toml`
 
@@ -61,8 +61,8 @@ def convert(
         out.
     f_number
         F-number of the main lens, for COMPOTE.
-    views
-        Number of views of LFToolbox' light fields, along an axis.
+    directions
+        Views along each axis of LFToolbox' light fields.
     pixel_pitch
         Pixel pitch, such as '1.4 um', if LFToolbox' file does not contain it.
     view_pitch
@@ -81,7 +81,9 @@ def convert(
         raise FormatError(f"{source} holds no lengths of a camera. Give one that `lumigraph board` measured.")
     else:
         far = length("--distance", distance)
-        left = metrology.save_camera(camera, found, output, to, distance=far, f_number=f_number, views=views)
+        left = metrology.save_camera(
+            camera, found, output, to, distance=far, f_number=f_number, directions=directions
+        )
         notes = (*notes, *left)
     return Result(
         "Converted", "A camera in the format of another program.", camera or found, (_headline(found),),

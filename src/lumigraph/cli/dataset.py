@@ -10,8 +10,7 @@ from cyclopts import Parameter
 from lumigraph.cli import files
 from lumigraph.cli.batch import WorkerOptions, kept
 from lumigraph.cli.console import line, progress
-from lumigraph.cli.deconvolve_options import depths
-from lumigraph.cli.options import COMMAND, COMMON, Common, Output
+from lumigraph.cli.options import COMMAND, COMMON, Common, Output, planes
 from lumigraph.cli.standing import StatusPage
 from lumigraph.cli.sweep import anywhere
 from lumigraph.cli.tolerance import Tolerances, given_tolerances
@@ -32,7 +31,7 @@ def dataset(
     /,
     *,
     count: Annotated[int, Parameter(name=("--count", "-n"), allow_leading_hyphen=True)],
-    z: Annotated[str, Parameter(allow_leading_hyphen=True)],
+    depth: Annotated[list[str], Parameter(allow_leading_hyphen=True, negative="")],
     output: Output,
     layout: Annotated[list[Literal["patches", "slanted", "beads"]] | None, Parameter(negative="")] = None,
     photographs: str | None = None,
@@ -51,13 +50,13 @@ def dataset(
     each place and what was drawn, in one Zarr store with a data card beside it (.md). The same seed draws
     the same samples. Safe to interrupt: run the same command again to resume.
 
-    Example: `lumigraph dataset thesis-plenoptic-1 -n 500 --z "-60 mm:60 mm:20 mm" -o train.zarr`
+    Example: `lumigraph dataset thesis-plenoptic-1 -n 500 --depth "-60 mm:60 mm:20 mm" -o train.zarr`
 
-    Example: `lumigraph dataset lfm-guv -n 100 --layout beads --z "-8 um:8 um:4 um" --volume -o beads.zarr`
+    Example: `lumigraph dataset lfm-guv -n 100 --layout beads --depth "-8 um:8 um:4 um" --volume -o beads.zarr`
 
-    Example: `lumigraph dataset thesis-plenoptic-1 -n 500 --z "-60 mm:60 mm:20 mm" -t "separation=±0.2 mm" --cameras 20 -o train.zarr`
+    Example: `lumigraph dataset thesis-plenoptic-1 -n 500 --depth "-60 mm:60 mm:20 mm" -t "separation=±0.2 mm" --cameras 20 -o train.zarr`
 
-    Example: `lumigraph dataset camera.toml -n 2000 --z "-9 mm:9 mm:3 mm" --photographs "photos/*.jpg" --vary "object_distance=300 mm, 320 mm" -o train.zarr --workers 2`
+    Example: `lumigraph dataset camera.toml -n 2000 --depth "-9 mm:9 mm:3 mm" --photographs "photos/*.jpg" --vary "object_distance=300 mm, 320 mm" -o train.zarr --workers 2`
 
     Parameters
     ----------
@@ -65,8 +64,8 @@ def dataset(
         Camera file (TOML), or the name of a bundled one.
     count
         Samples.
-    z
-        Depths of the scenes' planes from the focused one, positive farther: 'first:last:step', or some.
+    depth
+        Depths of the scenes' planes from the focused one, positive farther: a range '-9 mm:9 mm:3 mm', or some.
     output
         Zarr store (.zarr).
     layout
@@ -108,7 +107,7 @@ def dataset(
     found = tuple(str(Path(one).absolute()) for one in files.matching(photographs or ""))
     if photographs is not None and not found:
         raise FormatError(f"--photographs {photographs!r}: no file matches. Check the pattern.")
-    work = Draws(taking, depths("--z", z), layouts, found, seed, accuracy, volume)
+    work = Draws(taking, planes("--depth", depth), layouts, found, seed, accuracy, volume)
     if hands.slurm is not None:
         return hands.submitted(output)
     with progress("dataset") as shown, kept(output):

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli.console import progress
 from lumigraph.cli.files import check_output
-from lumigraph.cli.options import COMMON, Common, Output, length
+from lumigraph.cli.options import COMMON, Common, Output, lengths
 from lumigraph.cli.reporting import page
 from lumigraph.core.result import Figure, Result
 from lumigraph.errors import FormatError
@@ -28,7 +28,7 @@ def datasheet(
     /,
     *,
     camera: str | None = None,
-    depths: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
+    depth: Annotated[list[str] | None, Parameter(negative="", allow_leading_hyphen=True)] = None,
     exposures: int | None = None,
     seed: int = 1,
     accuracy: float = 1e-2,
@@ -55,8 +55,8 @@ def datasheet(
         Folders, camera files, or names of the catalogue.
     camera
         Camera file of the folders' pictures: depths in metres, and limits.
-    depths
-        Depths of simulated charts, from the plane in focus, such as --depths '-5 mm' --depths '0 mm'; five
+    depth
+        Depths of simulated charts, from the plane in focus, such as '-5 mm, 0 mm' or '-5 mm:5 mm:5 mm'; five
         distances over what the camera refocuses if left out.
     exposures
         Exposures of each simulated chart, white and dark image; 16, or fewer for a large sensor. The sheet
@@ -77,7 +77,7 @@ def datasheet(
     simulated = [source for source in sources if not Path(source).is_dir()]
     if charts is not None and (len(sources) > 1 or not simulated):
         raise FormatError("--charts takes the pictures of one camera file. Give that alone.")
-    planes = None if not depths else [length("--depths", one) or 0.0 for one in depths]
+    planes = lengths("--depth", depth) or None
     sheets, written = [], []
     from lumigraph import metrology
 

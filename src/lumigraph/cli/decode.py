@@ -32,7 +32,7 @@ class SamplingOptions:
     directions
         Views along each axis; one for each pixel of a micro-image if left out.
     samples
-        Samples of a view per lenslet: those between the lenslets are interpolated.
+        Samples per lenslet, of a view: those between the lenslets are interpolated.
     interpolation
         Interpolation between pixels, and between lenslets.
     hot_pixels

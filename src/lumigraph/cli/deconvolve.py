@@ -52,11 +52,11 @@ def deconvolve(
     afterwards. Ctrl-C writes what was reached. Several files are raw images of one object, deconvolved
     together; several pages of one file are a time series, deconvolved one after the other.
 
-    Example: `lumigraph deconvolve raw.tif --white white.tif --dark dark.tif --camera scope.toml --z "-20 um:20 um:2 um" -o volume.ome.tif`
+    Example: `lumigraph deconvolve raw.tif --white white.tif --dark dark.tif --camera scope.toml --depth "-20 um:20 um:2 um" -o volume.ome.tif`
 
-    Example: `lumigraph deconvolve film.tif --page 0:9 --camera scope.toml --z "-20 um:20 um:2 um" -o volume.ome.tif`
+    Example: `lumigraph deconvolve film.tif --page 0:9 --camera scope.toml --depth "-20 um:20 um:2 um" -o volume.ome.tif`
 
-    Example: `lumigraph deconvolve raw.tif --camera scope.toml --z "-12 um:12 um:4 um" --adaptive --terms 5-11 -o volume.ome.tif`
+    Example: `lumigraph deconvolve raw.tif --camera scope.toml --depth "-12 um:12 um:4 um" --adaptive --terms 5-11 -o volume.ome.tif`
 
     Example: `lumigraph deconvolve a.tif b.tif c.tif d.tif --shifts 2x2 --camera camera.toml -o picture.tiff`
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from lumigraph.cli.options import above_zero, length, region
+from lumigraph.cli.options import above_zero, planes, region
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from lumigraph.core.raw import RawImage
     from lumigraph.deconvolution import RichardsonLucy
     from lumigraph.instruments import Instrument
-
-MOST_DEPTHS = 1000
 
 
 @Parameter(name="*")
@@ -92,21 +90,21 @@ class ObjectOptions:
 
     Parameters
     ----------
-    z
+    depth
         Depths from the focused plane, positive farther: '-20 um:20 um:2 um' (first, last, step), or some,
-        separated by commas; the focused plane if left out.
+        separated by commas; may be repeated; the focused plane if left out.
     samples
-        Object samples along each lenslet.
+        Samples per lenslet, of the object.
     """
 
-    z: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    depth: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True, negative="")] = None
     samples: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
 
     def depths(self) -> tuple[float, ...] | None:
         """Depths [m]."""
         if self.samples is not None and self.samples < 1:
             raise FormatError(f"--samples is {self.samples} but must be at least 1.")
-        return None if self.z is None else depths("--z", self.z)
+        return None if self.depth is None else planes("--depth", self.depth)
 
 
 @Parameter(name="*")
@@ -168,39 +166,6 @@ class MethodOptions:
         prior = {"none": None, "tv": TotalVariation(**given), "wavelets": Wavelets(**given)}[self.prior]
         smooth = None if self.raw_lattice else low_pass_of(camera, operator)
         return RichardsonLucy(prior, smooth, accelerated=self.accelerated)
-
-
-def depths(option: str, text: str) -> tuple[float, ...]:
-    """Depths [m] written as 'first:last:step' or separated by commas.
-
-    Raises
-    ------
-    FormatError
-        No lengths, a step that does not lead from the first to the last, or more than `MOST_DEPTHS`.
-
-    >>> [round(dz * 1e6, 6) for dz in depths("--z", "-2 um:3 um:2 um")]
-    [-2.0, 0.0, 2.0]
-    >>> depths("--z", "-20 um:20 um:2 um")[10]
-    0.0
-    """
-    if ":" not in text:
-        found = sorted(length(option, part.strip()) or 0.0 for part in text.split(","))
-        if len(set(found)) < len(found):
-            raise FormatError(f"{option} {text!r} names a depth twice.")
-        return tuple(found)
-    parts = [length(option, part.strip()) or 0.0 for part in text.split(":")]
-    if len(parts) != 3:
-        raise FormatError(f"{option} is {text!r} but must be 'first:last:step', such as '-20 um:20 um:2 um'.")
-    first, last, step = parts
-    if step <= 0 or last < first:
-        raise FormatError(
-            f"{option} {text!r} must ascend: its step must be above 0, its last after its first."
-        )
-    count = (last - first) / step * (1 + 1e-9) + 1
-    if count > MOST_DEPTHS:
-        raise FormatError(f"{option} {text!r} asks for {count:.3g} depths; at most {MOST_DEPTHS} are taken.")
-    planes = (first + k * step for k in range(int(count)))
-    return tuple(0.0 if abs(dz) < 1e-9 * step else dz for dz in planes)  # no 1.7e-21 for the focused plane
 
 
 SEEN, WANTED, WAY = RawImageOptions(), ObjectOptions(), MethodOptions()

@@ -23,14 +23,11 @@ def demo(*, output: Output = Path("demo"), common: Common = COMMON) -> Result:
     """
     if output.exists() and not output.is_dir():
         raise FormatError(f"--output {output} is a file. Give a folder.")
-    if not output.parent.is_dir():
-        raise FormatError(
-            f"the folder {output.parent} for --output {output.name} does not exist. Make it first."
-        )
     from lumigraph import demo
-    from lumigraph.io.target import write_bytes
+    from lumigraph.io.target import check_parent, write_bytes
     from lumigraph.viewer import view_inline
 
+    check_parent(output)
     with progress("demo") as shown:
         page = demo.run(
             output, shown, living=lambda views, file: write_bytes(file, view_inline(views).page.encode())

@@ -1,6 +1,5 @@
 """`lumigraph depth`."""
 
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -9,9 +8,8 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, above_zero, length
+from lumigraph.cli.options import Output, above_zero, length, numbers
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions
-from lumigraph.cli.refocus import range_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions, enlarged
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.result import Figure, Quantity, Result
@@ -28,8 +26,6 @@ if TYPE_CHECKING:
     from lumigraph.instruments import Instrument
 
 MAPS = (".pfm", ".tif", ".tiff", ".png", ".zarr", ".ply")
-_PLANES = "0.9:1.1:21"
-_MOST_PLANES = 101
 _OF_RAW = ("dense", "correlation")
 
 
@@ -44,24 +40,24 @@ class SearchOptions:
         auto: epi for cameras 1.0 and views, dense for cameras 2.0; epi: lines of epipolar-plane images;
         focus: the sharpest picture of a focal stack; fused: both; dense: each pixel of a camera 2.0's
         picture, by all micro-images that show it; correlation: each of its lenslets, as render takes it.
-    between
+    range
         Least and most that may occur, 'least:most': disparities [px per view] for epi, patches [px] for
         dense and correlation; found by itself if left out.
     alphas
-        Refocus factors 'first:last:count' of the focal stack; if left out, 0.9:1.1:21 for focus, and those
+        Refocus factors of the focal stack, a range; if left out, 0.9:1.1:x21 for focus, and those
         that epi has found for fused.
     correct
         Correct what diffraction at the lenslets does to the method, by simulating textured planes before the
         camera of --camera, a plenoptic 1.0; takes half a minute.
     smooth
-        Smooth the map where it is not sure, along the picture's edges; 1 is usual.
+        Weight of smoothness where the map is not sure, along the picture's edges; 1 is usual.
     views
         Views of a light field to use: all; star: the middle row, column and diagonals; cross: the
         middle row and column; row: the middle row. Fewer take less time.
     """
 
     method: Literal["auto", "epi", "focus", "fused", "dense", "correlation"] = "auto"
-    between: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    range: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
     alphas: str | None = None
     correct: bool = False
     smooth: float = 0.0
@@ -69,14 +65,12 @@ class SearchOptions:
 
     def ends(self) -> tuple[float, float] | None:
         """The least and the most."""
-        if self.between is None:
+        if self.range is None:
             return None
         try:
-            low, high = map(float, self.between.split(":"))
+            low, high = map(float, self.range.split(":"))
         except ValueError:
-            raise FormatError(
-                f"--between is {self.between!r} but must be least:most, such as -2:3."
-            ) from None
+            raise FormatError(f"--range is {self.range!r} but must be least:most, such as -2:3.") from None
         return low, high
 
     def of_views(self, views: "LightField", shown: Progress) -> "DepthMap":
@@ -85,33 +79,12 @@ class SearchOptions:
 
         if self.method in _OF_RAW:
             raise FormatError(f"--method {self.method} is for raw images of cameras 2.0. Use --method epi.")
-        found: list[DepthMap] = []
-        views = rendering.arranged(views, self.views)
-        if self.method != "focus":
-            found.append(depth.epi(views, self.ends(), progress=shown))
-        if self.method in ("focus", "fused"):
-            sharp = depth.from_focus(views, self._planes(found, views))
-            found.append(sharp if self.method == "focus" else depth.disparity_of(sharp, views))
-        if self.method != "fused" and not self.smooth:
-            return found[0]
-        v, u = (n // 2 for n in views.aperture.shape)
-        return depth.fuse(found, views.view(v, u), smoothness=self.smooth or 1.0)
-
-    def _planes(self, found: "list[DepthMap]", views: "LightField") -> list[float]:
-        """Refocus factors of the focal stack: where disparities are known, a pixel apart in outer views."""
-        import numpy as np
-
-        from lumigraph import depth
-
-        if self.alphas is not None or not found:
-            return range_of("--alphas", self.alphas or _PLANES)
-        low, high = np.nanquantile(np.asarray(found[0].values, float), (0.02, 0.98))
-        count = max(views.aperture.shape)
-        spare = 2 / count
-        ends = depth.DepthMap(np.array([[high + spare, low - spare]]), np.ones((1, 2)), "disparity")
-        first, last = np.maximum(np.asarray(depth.alpha_of(ends, views).values)[0], 0.05)
-        planes = math.ceil((high - low + 2 * spare) * count) + 1
-        return [float(alpha) for alpha in np.linspace(first, last, min(max(21, planes), _MOST_PLANES))]
+        method: Any = "epi" if self.method == "auto" else self.method
+        return depth.estimate(
+            rendering.arranged(views, self.views), method, disparities=self.ends(),
+            alphas=None if self.alphas is None else numbers("--alphas", self.alphas),
+            smoothness=self.smooth, progress=shown,
+        )  # fmt: skip
 
     def of_raw(
         self, raw: "RawImage", calibration: "Calibration", sharp: "Sequence[float] | None", shown: Progress
@@ -186,7 +159,7 @@ def depth(
     *,
     output: Output,
     confidence: Path | None = None,
-    lowest: float = 0.5,
+    min_confidence: float = 0.5,
     origin: RawOptions = NO_ORIGIN,
     search: SearchOptions = SearchOptions(),
     lengths: LengthOptions = LengthOptions(),
@@ -211,7 +184,7 @@ def depth(
         else disparities [px per view], positive nearer, refocus factors, or patches [px].
     confidence
         File for the confidence of each place, from 0 to 1.
-    lowest
+    min_confidence
         Confidence below which a point is left out of .ply: 0.5 keeps those with an expected error of less
         than 0.45 px, of cameras 2.0 about 0.55 px.
     """
@@ -230,7 +203,7 @@ def depth(
             made = replace(made, depth=_corrected(made.depth, made.grounds, (camera, search), shown))
     found, distance = _in_metres(made.depth, made.grounds, lengths, camera)
     made = replace(made, depth=found)
-    _save(made, output, (distance, lowest))
+    _save(made, output, (distance, min_confidence))
     if confidence is not None:
         from lumigraph import io
 
@@ -314,8 +287,9 @@ def _save(made: _Measured, output: Path, points: tuple[float | None, float]) -> 
         picture = None if made.picture is None else to_numpy(made.picture).astype(float)
         picture = None if picture is None else np.clip(picture / (np.quantile(picture, 0.999) or 1), 0, 1)
         cloud = verbs.cloud(
-            found, made.grounds, object_distance=points[0], colours=picture, lowest=points[1], grid=made.grid
-        )
+            found, made.grounds, object_distance=points[0], colours=picture, min_confidence=points[1],
+            grid=made.grid,
+        )  # fmt: skip
         io.save(cloud, output)
     elif name.endswith(".png"):
         values = to_numpy(found.values).astype(float)

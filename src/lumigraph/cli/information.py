@@ -6,21 +6,21 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from lumigraph.cli.console import progress
-from lumigraph.cli.deconvolve_options import depths as planes_of
+from lumigraph.cli.options import planes as planes_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Quantity, Result
 
 if TYPE_CHECKING:
     from lumigraph.studies.information import Bounds
 
-Depths = Annotated[str, Parameter(allow_leading_hyphen=True)]
+Depths = Annotated[list[str], Parameter(allow_leading_hyphen=True, negative="")]
 
 
 def information(
     camera: str,
     /,
     *,
-    depths: Depths,
+    depth: Depths,
     photons: Annotated[float, Parameter(allow_leading_hyphen=True)] = 10_000.0,
     background: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0,
     places: Annotated[int, Parameter(allow_leading_hyphen=True)] = 4,
@@ -31,15 +31,15 @@ def information(
     No unbiased estimate of its place, depth and brightness, all of them unknown, has smaller errors. Noise is
     that of photons and of the camera file's sensor.
 
-    Example: `lumigraph information lfm-fourier --depths "-20 um:20 um:5 um" --photons 5000`
+    Example: `lumigraph information lfm-fourier --depth "-20 um:20 um:5 um" --photons 5000`
 
-    Example: `lumigraph information camera.toml --depths "-10 mm:10 mm:5 mm" --background 2 --json`
+    Example: `lumigraph information camera.toml --depth "-10 mm:10 mm:5 mm" --background 2 --json`
 
     Parameters
     ----------
     camera
         Camera file (TOML), or the name of a bundled one.
-    depths
+    depth
         Depths from the focused plane, such as '-20 um:20 um:5 um', or several, separated by commas.
     photons
         Photons of the point that enter the main lens or objective in one exposure.
@@ -52,7 +52,7 @@ def information(
     from lumigraph.studies.information import Light, bounds
 
     common.check()
-    planes = planes_of("--depths", depths)
+    planes = planes_of("--depth", depth)
     light = Light(photons, background)
     instrument = load_camera(camera)
     with progress("information") as shown:

@@ -28,12 +28,12 @@ class RegionOptions:
     ----------
     region
         Rows and columns, such as '100:180, 40:120'; the whole picture if left out.
-    pitch
+    pixel_pitch
         Pixel pitch, such as '5 um'; the file's if left out. Without one, frequencies are in cycles per pixel.
     """
 
     region: str | None = None
-    pitch: str | None = None
+    pixel_pitch: str | None = None
 
     def cut(self, picture: "RawImage") -> "np.ndarray":
         """The region of a picture (y, x), colours averaged."""
@@ -47,7 +47,7 @@ class RegionOptions:
 
     def pixels(self, picture: "RawImage") -> float | None:
         """Pitch [m], or None where neither the option nor the file says."""
-        return length("--pitch", self.pitch) or picture.pixel_pitch
+        return length("--pixel-pitch", self.pixel_pitch) or picture.pixel_pitch
 
 
 @Parameter(name="*")
@@ -61,13 +61,13 @@ class DarkOptions:
         Pictures without light, two of each exposure time; the first two have the flats' own.
     exposure_time
         Exposure time of each pair of darks, such as '10 ms': separates dark current from black level.
-    highest
+    full_scale
         Largest number that the sensor reads; by the file's bit depth if left out.
     """
 
     dark: list[Path] | None = None
     exposure_time: list[str] | None = None
-    highest: float | None = None
+    full_scale: float | None = None
 
 
 def measure(
@@ -98,7 +98,7 @@ def measure(
     """
     common.check()
     if what != "sensor" and dark != DarkOptions():
-        raise FormatError(f"--dark, --exposure-time and --highest are for 'sensor', not for {what!r}.")
+        raise FormatError(f"--dark, --exposure-time and --full-scale are for 'sensor', not for {what!r}.")
     from lumigraph.preparation import read_pages
 
     opened = [page for path in pictures for page in read_pages(path, "all").values()]
@@ -244,11 +244,11 @@ def _sensor(areas: "list[np.ndarray]", bits: int | None, looked: RegionOptions, 
     if not dark.dark or len(dark.dark) % 2:
         raise FormatError(f"there are {len(dark.dark or [])} --dark. Give two of each exposure time.")
     unlit = [looked.cut(read_raw(path, "dark picture")) for path in dark.dark]
-    top = above_zero("--highest", dark.highest)
+    top = above_zero("--full-scale", dark.full_scale)
     found = photon_transfer(
         _pairs(areas), _pairs(unlit),
         exposure_times=[parse(text, "time") for text in dark.exposure_time] if dark.exposure_time else None,
-        highest=top if top is not None or bits is None else 2.0**bits - 1,
+        full_scale=top if top is not None or bits is None else 2.0**bits - 1,
     )  # fmt: skip
     about = "Photon transfer: a pixel's variance grows with its mean by one over the gain. Intervals: 95 %."
     return _result("Sensor", about, found, _found(found), lambda: _curve(found))

@@ -9,8 +9,8 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files, optimised
 from lumigraph.cli.console import line, progress
-from lumigraph.cli.deconvolve_options import depths as planes_of
 from lumigraph.cli.options import Output, length
+from lumigraph.cli.options import planes as planes_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Result
 from lumigraph.errors import FormatError
@@ -31,16 +31,16 @@ class GoalOptions:
     Parameters
     ----------
     goal
-        depth, lateral or brightness: bounds of a point's errors over --depths. picture error: what the best
-        linear reconstruction of scenes leaves, at each of --depths; volume error: the same with scenes at all
+        depth, lateral or brightness: bounds of a point's errors over --depth. picture error: what the best
+        linear reconstruction of scenes leaves, at each of --depth; volume error: the same with scenes at all
         depths at once. Or 'largest' or 'least' and a
         number's name: light caught, one that 'lumigraph design' prints, or a simulated one of 'lumigraph
-        sweep', such as 'largest mtf@10/mm', the least over --depths.
+        sweep', such as 'largest mtf@10/mm', the least over --depth.
     against
         A second goal, as --goal: prints and draws the cameras that no other beats in both. Searches for it
         may take as many --evaluations again.
-    depths
-        Depths from the focused plane, such as '-5 mm:5 mm:5 mm'.
+    depth
+        Depths from the focused plane, such as '-5 mm:5 mm:5 mm'; may be repeated.
     photons
         Photons of a point, or of a scene's mean sample, that enter the camera as it is given; others get
         theirs by their aperture.
@@ -65,7 +65,7 @@ class GoalOptions:
 
     goal: str = "depth"
     against: str | None = None
-    depths: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    depth: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True, negative="")] = None
     photons: Annotated[float, Parameter(allow_leading_hyphen=True)] = 10_000.0
     background: Annotated[float, Parameter(allow_leading_hyphen=True)] = 0.0
     places: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
@@ -79,7 +79,7 @@ class GoalOptions:
         from lumigraph.studies.information import Light
         from lumigraph.studies.optimisation import Goal
 
-        planes = () if self.depths is None else planes_of("--depths", self.depths)
+        planes = () if self.depth is None else planes_of("--depth", self.depth)
         light = Light(self.photons, self.background)
         goal = Goal.parse(self.goal, planes, light, self.places)
         return replace(goal, scenes=self._scenes(goal.ready(given).scenes))
@@ -157,18 +157,18 @@ def optimise(
     All combinations of the first values are computed; then ranges are searched from the best of them. Safe
     to interrupt: run the same command again to resume; it finds the same camera.
 
-    Example: `lumigraph optimise lfm-fourier --vary "fourier_lens=60 mm:110 mm:3" --vary "lenslets.pitch=1 mm, 1.25 mm, 1.5 mm" --depths "-20 um:20 um:10 um" -o best.toml`
+    Example: `lumigraph optimise lfm-fourier --vary "fourier_lens=60 mm:110 mm:x3" --vary "lenslets.pitch=1 mm, 1.25 mm, 1.5 mm" --depth "-20 um:20 um:10 um" -o best.toml`
 
-    Example: `lumigraph optimise camera.toml --vary "lenslets.magnification=0.2:0.6:5" --goal "largest mtf@10/mm" -o best.toml --report best.html`
+    Example: `lumigraph optimise camera.toml --vary "lenslets.magnification=0.2:0.6:x5" --goal "largest mtf@10/mm" -o best.toml --report best.html`
 
     Parameters
     ----------
     camera
         Camera file (TOML), or the name of a bundled one.
     vary
-        A key of the camera file and its values, as in 'lumigraph sweep': 'first:last:count' is a range, of which
+        A key of the camera file and its values, as in 'lumigraph sweep': a range (first:last:step or first:last:xN), of which
         so many values are tried first; values separated by commas are a stock. Of a list such as a tilt, a
-        number is the value's place: 'built.array_tilt.0=-2 mrad:2 mrad:3'. May be repeated.
+        number is the value's place: 'built.array_tilt.0=-2 mrad:2 mrad:x3'. May be repeated.
     output
         Camera file of the best (.toml).
     """  # noqa: E501 - an example is one line

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from lumigraph.errors import FormatError
-from lumigraph.units import parse
+from lumigraph.units import parse, spaced
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,10 +35,13 @@ class Common:
         Print one JSON object, lengths in metres.
     debug
         Show the traceback of an error.
+    overwrite
+        Replace outputs that another command, or the same one for other inputs, has written.
     """
 
     json: Annotated[bool, Parameter(negative="")] = False
     debug: Annotated[bool, Parameter(negative="")] = False
+    overwrite: Annotated[bool, Parameter(negative="")] = False
 
 
 COMMON = Common()
@@ -68,6 +71,73 @@ def length(option: str, text: str | None) -> float | None:
         return parse(text)
     except FormatError as error:
         raise FormatError(f"{option}: {error}") from error
+
+
+RENAMED = {
+    "--z": ("--depth",),
+    "--depths": ("--depth",),
+    "--lowest": ("--min-confidence",),
+    "--highest": ("--full-scale",),
+    "--between": ("--range",),
+    "--still": ("--pivot",),
+    "--smoothness": ("--smooth",),
+    "--views": ("--in-views", "--directions"),
+    "--shape": ("--aperture-shape",),
+    "--pitch": ("--pixel-pitch",),
+}
+"""Options of earlier versions, and those that took their place."""
+
+
+def numbers(option: str, text: str) -> list[float]:
+    """Numbers of a range after `option`, see `units.spaced`; of pixels, the unit may stand with each.
+
+    Raises
+    ------
+    FormatError
+        Another form, or another unit.
+    """
+    found, unit = spaced(text, option)
+    if unit not in ("", "px"):
+        raise FormatError(f"{option} {text!r} has the unit {unit!r} but takes numbers, such as 0.9:1.1:x9.")
+    return found
+
+
+def lengths(option: str, texts: "str | Sequence[str] | None") -> list[float]:
+    """Lengths [m] after `option`: each one length, several with commas between them, or a range.
+
+    Raises
+    ------
+    FormatError
+        Another form, another dimension, or no unit.
+
+    >>> lengths("--depth", ["-2 um:2 um:2 um", "5 um, 1 mm"])
+    [-2e-06, 0.0, 2e-06, 5e-06, 0.001]
+    """
+    found: list[float] = []
+    for text in [texts] if isinstance(texts, str) else texts or ():
+        for part in text.split(","):
+            values, unit = spaced(part, option) if ":" in part else ([part.strip()], "")
+            found += [length(option, f"{value} {unit}".strip()) or 0.0 for value in values]
+    return found
+
+
+def planes(option: str, texts: "str | Sequence[str]") -> tuple[float, ...]:
+    """Depths [m] of a volume after `option`, ascending; see `lengths`.
+
+    Raises
+    ------
+    FormatError
+        A range that goes down, or a depth twice.
+    """
+    for text in [texts] if isinstance(texts, str) else texts:
+        for part in text.split(","):
+            values = spaced(part, option)[0] if ":" in part else []
+            if values[1:] and values[-1] < values[0]:
+                raise FormatError(f"{option} {part.strip()!r} must ascend: write its least depth first.")
+    found = sorted(lengths(option, texts))
+    if len(set(found)) < len(found):
+        raise FormatError(f"{option} {texts!r} names a depth twice.")
+    return tuple(found)
 
 
 _REGION = re.compile(r"\s*(\d+):(\d+)\s*,\s*(\d+):(\d+)\s*")

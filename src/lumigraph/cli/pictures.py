@@ -41,17 +41,17 @@ def unpack(path: Path, parts: list[str], output: Path) -> Result:
         Damaged, or the output is no folder.
     """
     from lumigraph import io
+    from lumigraph.io.target import check_parent
 
     if output.suffix or (output.exists() and not output.is_dir()):
         raise FormatError(
             f"{path} holds no raw image but pictures ({', '.join(parts)}) and {output} is one file. "
             "Give -o a folder, a name without extension."
         )
-    if not output.parent.is_dir():
-        raise FormatError(f"the folder {output.parent} for {output.name} does not exist. Make it first.")
+    check_parent(output)
     found = {name: picture for part in parts for name, picture in _named(part, io.open(path, what=part))}
     files.check_inside(output / name for name in found)
-    output.mkdir(exist_ok=True)
+    output.mkdir(parents=True, exist_ok=True)
     for name, picture in found.items():
         io.save(picture, output / name)
     sizes = {name: _size(name, picture) for name, picture in found.items()}

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, length
+from lumigraph.cli.options import Output, lengths, numbers
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions, notes_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions, enlarged
 from lumigraph.core.progress import Progress
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from lumigraph.core.lightfield import LightField
     from lumigraph.instruments.capabilities import Decoded
 
-_MOST = 1000
 _MOST_SAMPLES = 64
 MOST_SHOWN = 24
 """Pictures in a report."""
@@ -39,10 +38,10 @@ class FocusOptions:
     alpha
         Refocus factor α'; may be repeated.
     alphas
-        A range of refocus factors 'first:last:count', such as 0.9:1.1:9.
+        A range of refocus factors: first, last and step, such as 0.9:1.1:0.025, or their count, 0.9:1.1:x9.
     depth
-        Depth to focus on, from the focused plane, such as '5 mm' (farther) or '-5 um'; may be repeated; needs
-        --camera, which may be a microscope.
+        Depth to focus on, from the focused plane, such as '5 mm' (farther), or a range '-10 um:10 um:5 um';
+        may be repeated; needs --camera, which may be a microscope.
     """
 
     alpha: Annotated[list[float] | None, Parameter(consume_multiple=True)] = None
@@ -52,7 +51,7 @@ class FocusOptions:
     def check(self, camera: "Decoded | None") -> None:
         """Refuse what can be seen to be wrong before anything is read."""
         if not (self.alpha or self.alphas or self.depth):
-            raise FormatError("no focus is given. Give --alpha 0.95 or --alphas 0.9:1.1:9.")
+            raise FormatError("no focus is given. Give --alpha 0.95 or --alphas 0.9:1.1:x9.")
         if self.depth and camera is None:
             raise FormatError("--depth needs the camera's geometry. Give --camera FILE, or --alpha.")
         for alpha in self.alpha or []:
@@ -61,18 +60,19 @@ class FocusOptions:
     @property
     def count(self) -> int:
         """Number of requested pictures."""
-        several = range_of("--alphas", self.alphas) if self.alphas else []
-        return len(self.alpha or []) + len(several) + len(self.depth or [])
+        return len(self._alphas()) + len(lengths("--depth", self.depth))
 
     def chosen(self, camera: "Decoded | None", views: "LightField") -> list[float]:
         """All factors, as given."""
-        found = [*(self.alpha or []), *(range_of("--alphas", self.alphas) if self.alphas else [])]
-        depths = [length("--depth", text) or 0.0 for text in self.depth or []]
+        found = self._alphas()
         if camera is not None:
-            found += [camera.refocus_factor(dz, views.separation) for dz in depths]
+            found += [camera.refocus_factor(dz, views.separation) for dz in lengths("--depth", self.depth)]
         for alpha in found:
             _check_alpha(alpha)
         return found
+
+    def _alphas(self) -> list[float]:
+        return [*(self.alpha or []), *(numbers("--alphas", self.alphas) if self.alphas else [])]
 
 
 def _check_alpha(alpha: float) -> None:
@@ -91,7 +91,7 @@ class PictureOptions:
         shear: sums sheared views; fourier: slices their spectrum.
     aperture
         Part of the aperture's width that is used: smaller is sharper in depth, and noisier.
-    shape
+    aperture_shape
         Shape of the aperture: all views, those inside a circle, or those in a ring.
     oversample
         Pixels per lenslet, for shear; away from the focused plane the views fill in the detail.
@@ -101,7 +101,7 @@ class PictureOptions:
 
     method: Literal["shear", "fourier"] = "shear"
     aperture: float = 1.0
-    shape: Literal["square", "round", "ring"] = "square"
+    aperture_shape: Literal["square", "round", "ring"] = "square"
     oversample: Annotated[int, Parameter(allow_leading_hyphen=True)] = 1
     interpolation: Literal["linear", "cubic", "band_limited"] = "cubic"
 
@@ -118,7 +118,7 @@ class PictureOptions:
         """The pictures focused by each factor."""
         from lumigraph import rendering
 
-        views = rendering.reduce_aperture(views, self.aperture, shape=self.shape)
+        views = rendering.reduce_aperture(views, self.aperture, shape=self.aperture_shape)
         if self.method == "shear":
             stack = rendering.refocus_stack(
                 views,
@@ -149,7 +149,7 @@ def refocus(
 
     Example: `lumigraph refocus views.zarr --alpha 0.95 -o near.png`
 
-    Example: `lumigraph refocus raw.png --white white.png --alphas 0.9:1.1:9 -o stack.tiff`
+    Example: `lumigraph refocus raw.png --white white.png --alphas 0.9:1.1:x9 -o stack.tiff`
 
     Example: `lumigraph refocus views.zarr --camera camera.toml --depth "-5 mm" --depth "5 mm" -o two.tiff`
 
@@ -173,7 +173,7 @@ def refocus(
     shape = images[0].shape[:2]
     values = (
         Quantity("alphas", alphas), Quantity("shape", shape, "px"), Quantity("method", quality.method),
-        Quantity("aperture", quality.aperture), Quantity("aperture_shape", quality.shape),
+        Quantity("aperture", quality.aperture), Quantity("aperture_shape", quality.aperture_shape),
     )  # fmt: skip
     return Result(
         "Refocus", "Pictures refocused; α' above 1 is farther.", images,
@@ -205,8 +205,10 @@ def _check_output(output: Path, count: int) -> None:
         files.check_output(output, files.PICTURES if count == 1 else (".tif", ".tiff", *files.MOVIES))
     elif output.exists() and not output.is_dir():
         raise FormatError(f"{output} is a file. Give a folder, or a stack that ends in .tiff.")
-    elif not output.parent.is_dir():
-        raise FormatError(f"the folder {output.parent} for {output.name} does not exist. Make it first.")
+    else:
+        from lumigraph.io.target import check_parent
+
+        check_parent(output)
 
 
 def _write(images: list[Any], alphas: list[float], output: Path) -> list[Path]:
@@ -223,27 +225,9 @@ def _write(images: list[Any], alphas: list[float], output: Path) -> list[Path]:
         return [output]
     paths = [output / f"refocused-{k:03}-alpha-{alpha:.4f}.png" for k, alpha in enumerate(alphas)]
     files.check_inside(paths)
-    output.mkdir(exist_ok=True)
+    output.mkdir(parents=True, exist_ok=True)
     # One white for all, so that the pictures of a folder can be compared.
     white = max(float(image.max()) for image in images) or None
     for image, path in zip(images, paths, strict=True):
         io.save(image, path, white=white)
     return paths
-
-
-def range_of(option: str, text: str) -> list[float]:
-    """The numbers of a range 'first:last:count' after an option.
-
-    Raises
-    ------
-    FormatError
-        Another form, or a count that is too large.
-    """
-    try:
-        words = text.split(":")
-        first, last, count = float(words[0]), float(words[1]), int(":".join(words[2:]))
-    except (IndexError, ValueError):
-        raise FormatError(f"{option} is {text!r} but must be first:last:count, such as 0.9:1.1:9.") from None
-    if not 2 <= count <= _MOST or not math.isfinite(first) or not math.isfinite(last):
-        raise FormatError(f"{option} is {text!r} but needs finite numbers and a count from 2 to {_MOST}.")
-    return [first + (last - first) * k / (count - 1) for k in range(count)]

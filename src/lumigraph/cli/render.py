@@ -8,9 +8,9 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, length
+from lumigraph.cli.options import Output, length, numbers
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions
-from lumigraph.cli.refocus import MOST_SHOWN, range_of
+from lumigraph.cli.refocus import MOST_SHOWN
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.progress import Progress
 from lumigraph.core.result import Figure, Quantity, Result
@@ -39,19 +39,19 @@ class TileOptions:
     patch
         Size of the piece of each micro-image, in pixels; negative for a Galilean camera.
     patches
-        A range 'first:last:count' of sizes: one picture focused on each plane.
+        A range of sizes, first:last:step or first:last:xN: one picture focused on each plane.
     depth
         Depth to render without seams, from the focused plane of --camera, such as '5 mm' (farther) or
         '-5 mm' (nearer); or 'auto': measured for each lenslet, so that everything is sharp.
     blend
         Mix all micro-images that show a place: no seams, and what is at another depth is blurred.
     samples
-        Samples of the picture per lenslet; the size of the patch if left out.
+        Samples per lenslet, of the picture; the size of the patch if left out.
     finer
         Finer sampling than the pixels of a patch, 2 times or more, from all micro-images that show a place.
-    smoothness
-        Smoothness for --finer: 0.02 resolves most; 0.1 to 0.3 removes the mesh that a noisy raw image or
-        three kinds of lenslets leave.
+    smooth
+        Weight of smoothness for --finer: 0.02 resolves most; 0.1 to 0.3 removes the mesh that a noisy raw
+        image or three kinds of lenslets leave.
     focus
         For three kinds of lenslets without --camera: the patch at which each is sharp, in pixels,
         such as '-13.5,-10.5,-7.5'.
@@ -63,7 +63,7 @@ class TileOptions:
     blend: bool = False
     samples: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
     finer: Annotated[int, Parameter(allow_leading_hyphen=True)] = 1
-    smoothness: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
+    smooth: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
     focus: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
 
     @property
@@ -95,12 +95,12 @@ class TileOptions:
             )
         self.chosen_focus()
         if self.patches is not None:
-            range_of("--patches", self.patches)
+            numbers("--patches", self.patches)
         if not 1 <= self.finer <= _MOST_FINER:
             raise FormatError(f"--finer is {self.finer} but must be from 1 to {_MOST_FINER}.")
-        if self.smoothness is not None and (self.finer == 1 or not 0 <= self.smoothness < float("inf")):
+        if self.smooth is not None and (self.finer == 1 or not 0 <= self.smooth < float("inf")):
             raise FormatError(
-                f"--smoothness is {self.smoothness:g} but must be at least 0, and is for --finer 2 or more."
+                f"--smooth is {self.smooth:g} but must be at least 0, and is for --finer 2 or more."
             )
         if self.finer > 1 and (self.patches is not None or self.samples is not None or self.blend):
             raise FormatError(
@@ -145,14 +145,14 @@ class ViewOptions:
     all_in_focus
         Make everything sharp; for a raw image of a camera 2.0 the same as --depth auto.
     alphas
-        Refocus factors to try, 'first:last:count'; taken from the views' disparities if left out.
+        Refocus factors to try, a range such as 0.9:1.1:x9; taken from the views' disparities if left out.
     path
         Pictures from a point of view that moves over the aperture.
     frames
         Number of pictures along the path.
     radius
         Radius of the path, relative to the aperture's.
-    still
+    pivot
         Refocus factor of the plane that does not move.
     """
 
@@ -161,7 +161,7 @@ class ViewOptions:
     path: Literal["circle", "line", "eight"] | None = None
     frames: int = 24
     radius: float = 0.7
-    still: float = 1.0
+    pivot: float = 1.0
 
     def check(self) -> None:
         """Refuse options that contradict each other."""
@@ -280,11 +280,11 @@ def _from_raw(
         extra, order = depth.of_lenslets(ready, calibration, focus=matched, progress=shown)
         size, sharp = extra.values, order or sharp
     if tiles.patches is not None:
-        sizes = range_of("--patches", tiles.patches)
+        sizes = numbers("--patches", tiles.patches)
         stack = preparation.render_stack(ready, calibration, sizes, samples=tiles.samples, focus=sharp)
         return _planes(stack, sizes, output, ready.notes)
     if tiles.finer > 1:
-        known: dict[str, Any] = {} if tiles.smoothness is None else {"smoothness": tiles.smoothness}
+        known: dict[str, Any] = {} if tiles.smooth is None else {"smoothness": tiles.smooth}
         image = preparation.super_resolve(
             ready, calibration, size, factor=tiles.finer, progress=shown, **known
         )
@@ -317,13 +317,13 @@ def _from_views(views: "LightField", look: ViewOptions, output: Path, shown: Pro
 
     look.check()
     if look.path is not None:
-        stack = rendering.view_path(views, look.frames, path=look.path, radius=look.radius, alpha=look.still)
+        stack = rendering.view_path(views, look.frames, path=look.path, radius=look.radius, alpha=look.pivot)
         io.save(Stack(stack), output)
         count, rows, columns = stack.shape[:3]
         text = f"{count} pictures of {rows} x {columns} px"
         return _RenderedPicture(list(stack), text, (Quantity("frames", count),))
     if look.alphas is not None:
-        made = rendering.all_in_focus(views, range_of("--alphas", look.alphas), progress=shown)
+        made = rendering.all_in_focus(views, numbers("--alphas", look.alphas), progress=shown)
         extra = depth.DepthMap(made.alpha, made.confidence, "alpha")
     else:
         extra = depth.alpha_of(depth.epi(views, progress=shown), views)

@@ -30,6 +30,8 @@ class ReportOptions(Common):
         Print one JSON object, lengths in metres.
     debug
         Show the traceback of an error.
+    overwrite
+        Replace outputs that another command, or the same one for other inputs, has written.
     report
         Write a page with figures, numbers, the command and the versions into this file (.html).
     """
@@ -81,6 +83,8 @@ def tell(common: Common, result: Result) -> None:
     if isinstance(common, ReportOptions) and common.report is not None:
         page(result).write(common.report)
         text, values = f"{text}\nwritten {printable(common.report)}", {**values, "report": str(common.report)}
+        files.note_written([common.report])
+    files.note_written(result.written)
     console.report(common, text, values if result.rows is None else result.rows)
 
 

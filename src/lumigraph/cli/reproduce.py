@@ -56,7 +56,7 @@ def reproduce(
     _check_folder(output)
     from lumigraph.studies.thesis import pages, run
 
-    output.mkdir(exist_ok=True)
+    output.mkdir(parents=True, exist_ok=True)
     with progress("reproduce") as shown:
         results = run.run(
             chosen, output, quick=quick, fresh=fresh, progress=shown, finished=_tell
@@ -78,10 +78,9 @@ def reproduce(
 def _check_folder(output: Path) -> None:
     if output.exists() and not output.is_dir():
         raise FormatError(f"--output {output} is a file. Give a folder.")
-    if not output.parent.is_dir():
-        raise FormatError(
-            f"the folder {output.parent} for --output {output.name} does not exist. Make it first."
-        )
+    from lumigraph.io.target import check_parent
+
+    check_parent(output)
 
 
 def _listed(chosen: "tuple[Experiment, ...]") -> Result:

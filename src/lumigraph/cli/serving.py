@@ -28,14 +28,6 @@ def announce(address: str, common: Common, *, no_open: bool) -> None:
     report(common, address, {"address": address})
     sys.stdout.flush()
     if not no_open:
-        import threading
-        import webbrowser
+        from lumigraph.viewer import open_in_browser
 
-        from lumigraph.viewer import redirecting
-
-        try:
-            file = redirecting(address)
-        except OSError as error:
-            line(f"no browser is opened: {error.strerror or error}. Open the address above.")
-            return
-        threading.Thread(target=webbrowser.open, args=(file.as_uri(),), daemon=True).start()
+        open_in_browser(address, line)

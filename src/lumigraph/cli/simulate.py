@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, length
+from lumigraph.cli.options import Output, length, lengths
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError, GeometryError, ParaxialWarning
@@ -204,14 +204,18 @@ class SceneOptions:
         if self.depth_map is not None:
             if len(self.scene or []) != 1:
                 raise FormatError(f"--depth-map is of one --scene, not {len(self.scene or [])}. Give one.")
-            if len(self.depth or []) not in (0, 2):
+            if len(self._depths()) not in (0, 2):
                 raise FormatError(
-                    f"--depth-map takes 2 --depth, of white and of black, not {len(self.depth or [])}."
+                    f"--depth-map takes 2 --depth, of white and of black, not {len(self._depths())}."
                 )
-        elif self.depth and len(self.depth) not in (1, len(self.scene or [])):
+        elif len(self._depths()) not in (0, 1, len(self.scene or [])):
             raise FormatError(
-                f"there are {len(self.depth)} --depth for {len(self.scene or [])} --scene. Give one for each."
+                f"there are {len(self._depths())} --depth for {len(self.scene or [])} --scene. "
+                "Give one for each."
             )
+
+    def _depths(self) -> list[float]:
+        return lengths("--depth", self.depth)
 
     def built(self, camera: "Instrument") -> "Scene":
         """Everything together, before a camera."""
@@ -221,8 +225,7 @@ class SceneOptions:
         if self.depth_map is not None:
             lit = self._with_depths(camera, self.depth_map)
             return lit + targets.points([_point(text) for text in self.point]) if self.point else lit
-        texts = (self.depth or ["0 mm"]) * (len(names) if len(self.depth or [""]) == 1 else 1)
-        depths = [length("--depth", text) or 0.0 for text in texts]
+        depths = (self._depths() or [0.0]) * (len(names) if len(self._depths()) < 2 else 1)
         parts = [_scene(name, grid).at(dz) for name, dz in zip(names, depths, strict=True)]
         if self.point:
             parts.append(targets.points([_point(text) for text in self.point]))
@@ -267,7 +270,7 @@ class SceneOptions:
         if values.ndim != 2:
             raise FormatError(f"--depth-map {path} has shape {values.shape} but must be grey (y, x).")
         if self.depth:
-            white, black = (length("--depth", text) or 0.0 for text in self.depth)
+            white, black = self._depths()
             highest = np.iinfo(values.dtype).max if values.dtype.kind in "iu" else 1.0
             values = black + (white - black) * (values / highest)
         elif values.dtype.kind in "iu":

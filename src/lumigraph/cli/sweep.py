@@ -46,15 +46,15 @@ def sweep(
     simulated picture of a chessboard. An impossible combination becomes a row with the reason.
     Safe to interrupt: run the same command again to resume.
 
-    Example: `lumigraph sweep thesis-plenoptic-2-m050 --vary "lenslets.focal_length=4 mm:6 mm:9" --vary "lenslets.magnification=0.3,0.5" --measure "views per axis, lateral resolution" -o table.csv`
+    Example: `lumigraph sweep thesis-plenoptic-2-m050 --vary "lenslets.focal_length=4 mm:6 mm:x9" --vary "lenslets.magnification=0.3,0.5" --measure "views per axis, lateral resolution" -o table.csv`
 
     Parameters
     ----------
     camera
         Camera file (TOML), or the name of a bundled one.
     vary
-        A key of the camera file and its values: 'first:last:count', or several, separated by commas. Of a
-        list such as a tilt, a number is the value's place: 'built.array_tilt.0=-2 mrad:2 mrad:3'.
+        A key of the camera file and its values: a range, first:last:step or first:last:xN, or several, separated by commas. Of a
+        list such as a tilt, a number is the value's place: 'built.array_tilt.0=-2 mrad:2 mrad:x3'.
         May be repeated: every combination is computed.
     measure
         Names of quantities as 'lumigraph design' prints them, separated by commas; all if left out. Simulated:

@@ -22,6 +22,7 @@ import lumigraph
 from lumigraph import store
 from lumigraph.cluster.entry import Entry, is_entry, is_inside, is_kind
 from lumigraph.errors import FormatError
+from lumigraph.io.target import check_parent
 
 try:
     import fcntl
@@ -378,9 +379,8 @@ def require_free(output: Path) -> None:
     Raises
     ------
     FormatError
-        Its folder does not exist, or it is somebody else's.
+        Its folder may not be written to, or it is somebody else's.
     """
-    if not output.parent.is_dir():
-        raise FormatError(f"the folder {output.parent} for {output.name} does not exist. Make it first.")
+    check_parent(output)
     if output.exists() and not (Ledger.beside(output).folder / _JOB).exists():
         raise FormatError(f"{output} exists and has no ledger. Remove it, or give another output.")

@@ -105,7 +105,7 @@ class Calibration:
             checks.instance("aside", self.aside, LatticeOffsets, CalibrationError)
         for name in ("pixel_pitch", "separation", "lenslet_distance", "fill"):
             if (value := getattr(self, name)) is not None:
-                checks.positive(name, value, error=CalibrationError)
+                object.__setattr__(self, name, checks.positive(name, value, error=CalibrationError))
 
     @property
     def measured(self) -> bool:

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from lumigraph import units
 from lumigraph.core.arrays import is_parameter, number, to_numpy
-from lumigraph.errors import GeometryError, LumigraphError
+from lumigraph.errors import FormatError, GeometryError, LumigraphError
 
 Pair = tuple[float, float]
 
@@ -18,8 +19,10 @@ _MOST = 2**31 - 1  # along one axis: more would overflow the index types of arra
 
 
 def finite(name: str, value: float, unit: str = "m", error: type[LumigraphError] = GeometryError) -> float:
-    """`value` as a float, refused unless it is one finite real number."""
+    """`value` as a float, refused unless it is one finite real number, or a length as "158 mm"."""
     number = math.nan
+    if isinstance(value, str) and unit == "m":
+        return _metres(name, value, error)
     if isinstance(value, Real) and not isinstance(value, bool):
         with suppress(OverflowError):  # a whole number beyond the largest float
             number = float(value)
@@ -27,6 +30,15 @@ def finite(name: str, value: float, unit: str = "m", error: type[LumigraphError]
         told = "" if unit == "1" else f" [{unit}]"
         raise error(f"{name} is {shown(value)} but must be a finite number{told}.")
     return number
+
+
+def _metres(name: str, text: str, error: type[LumigraphError]) -> float:
+    try:
+        return units.parse(text)
+    except FormatError:
+        raise error(
+            f"{name} is {text[:60]!r} but must be a finite number [m], or text with a unit such as '150 um'."
+        ) from None
 
 
 def shown(value: Any) -> str:
@@ -41,7 +53,7 @@ def positive(name: str, value: float, unit: str = "m", error: type[LumigraphErro
     number = finite(name, value, unit, error)
     if number <= 0:
         told = "" if unit == "1" else f" {unit}"
-        raise error(f"{name} is {value:g}{told} but must be above 0{told}.")
+        raise error(f"{name} is {number:g}{told} but must be above 0{told}.")
     return number
 
 

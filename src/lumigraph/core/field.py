@@ -44,7 +44,7 @@ class Field:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        checks.positive("wavelength", self.wavelength)
+        object.__setattr__(self, "wavelength", checks.positive("wavelength", self.wavelength))
         checks.array("data", self.data)
         checks.instance("grid", self.grid, Grid)
         if tuple(self.data.shape[-2:]) != self.grid.shape:

@@ -50,7 +50,7 @@ class LightField(Noun[A]):
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        checks.positive("separation", self.separation)
+        object.__setattr__(self, "separation", checks.positive("separation", self.separation))
         checks.array("data", self.data)
         checks.instance("aperture", self.aperture, Grid)
         checks.instance("lenslets", self.lenslets, Grid)

@@ -62,7 +62,7 @@ class RawImage(Noun[A]):
         if len(shape) not in (2, 3) or min(shape) < 1:
             raise GeometryError(f"a raw image has shape (y, x) or (y, x, c), not {shape}.")
         if self.pixel_pitch is not None:
-            checks.positive("pixel_pitch", self.pixel_pitch)
+            object.__setattr__(self, "pixel_pitch", checks.positive("pixel_pitch", self.pixel_pitch))
         bits = self.bit_depth
         if bits is not None and checks.whole("bit_depth", bits, error=FormatError) > _MOST_BITS:
             raise FormatError(f"bit_depth is {bits} but must be at most {_MOST_BITS}.")

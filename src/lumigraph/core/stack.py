@@ -73,7 +73,7 @@ class Stack(Noun[A]):
         if not isinstance(self.quantity, str):
             raise GeometryError(f"quantity is {self.quantity!r} but must be text, such as 'alpha'.")
         if self.pixel_pitch is not None:
-            checks.positive("pixel_pitch", self.pixel_pitch)
+            object.__setattr__(self, "pixel_pitch", checks.positive("pixel_pitch", self.pixel_pitch))
         if not isinstance(self.metadata, Mapping):
             raise GeometryError(f"metadata is {self.metadata!r} but must be a mapping of names to values.")
 

@@ -1,5 +1,7 @@
 """Registry of functions of upper floors that nouns call: `core` imports none of them, `lumigraph` does."""
 
+from os import PathLike
+
 TYPE_CHECKING = False  # `typing` is slow to import, and `import lumigraph` imports this
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -9,7 +11,7 @@ _homes: "dict[str, Callable[[], Any]]" = {}
 
 
 def register(**homes: "Callable[[], Any]") -> None:
-    """Register functions that return the modules "plots" and "describe"; called when first needed."""
+    """Register functions that return the modules "plots", "describe" and "cameras" when first needed."""
     _homes.update(homes)
 
 
@@ -21,6 +23,25 @@ def draw(name: str, *things: "Any", **options: "Any") -> "Any":
 def describe(name: str, instrument: "Any") -> "Any":
     """The table that the function `name` of `lumigraph.describe` makes of an instrument."""
     return _function("describe", name)(instrument)
+
+
+def camera(given: "Any") -> "Any":
+    """The camera of a file or of a name in the catalogue; a camera as it is.
+
+    Raises
+    ------
+    FormatError
+        No such file or name, or no camera in it.
+    """
+    return _function("cameras", "load_camera")(given) if isinstance(given, str | PathLike) else given
+
+
+def design(given: "Any") -> "Any":
+    """Everything that follows from a camera, its file, or its name in the catalogue, as a table.
+
+    It is what `lumigraph.design(camera)` runs.
+    """
+    return describe("describe", camera(given))
 
 
 def _function(home: str, name: str) -> "Any":

@@ -36,3 +36,7 @@ __all__ = [
     "deconvolve",
     "deconvolve_series",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

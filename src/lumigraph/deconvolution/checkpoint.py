@@ -43,8 +43,6 @@ class Checkpoint:
 
     def __post_init__(self) -> None:
         self.path = Path(self.path)
-        if not self.path.parent.is_dir():
-            raise FormatError(f"the folder {self.path.parent} for {self.path.name} does not exist.")
         if self.path.suffix != ".npz":
             raise FormatError(f"the checkpoint {self.path} must end in .npz.")
         if checks.finite("every", self.every, "s") < 0:

@@ -94,7 +94,7 @@ def widths_of(distances: Sequence[float], pitch: float) -> tuple[float, ...]:
     >>> [round(width, 6) for width in widths_of([6e-6, 3e-6, 0.0], 1.5e-6)]
     [4.0, 2.0, 0.0]
     """
-    checks.positive("pitch", pitch)
+    pitch = checks.positive("pitch", pitch)
     if not all(math.isfinite(d) and d >= 0 for d in distances):
         raise GeometryError(f"distances are {tuple(distances)} m but must be at least 0 m.")
     return tuple(float(d) / pitch for d in distances)

@@ -7,3 +7,7 @@
 from lumigraph.demo.showcase import run
 
 __all__ = ["run"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -14,7 +14,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.plots import layout
-from lumigraph.rendering import decode, reduce_aperture, refocus, render, view
+from lumigraph.rendering import decode, reduce_aperture, refocus, render, sub_aperture
 from lumigraph.samples import BenchSample, bench, camera_file
 from lumigraph.units import mm
 
@@ -108,8 +108,10 @@ def _plenoptic(page: report.Page, folder: Path, living: Living | None, tell: Pro
     section.figure(stopped, "Aperture stopped down to 40 %: more depth of field, more noise", zoom=5)
     rim, middle = views.data.shape[1] // 5, views.data.shape[0] // 2
     sides = rim, views.data.shape[1] - 1 - rim
-    section.figure(view(views, middle, sides[0]), "One view, from one side of the main lens", zoom=5)
-    section.figure(view(views, middle, sides[1]), parallax(views, sides, (alphas[0], alphas[2])), zoom=5)
+    section.figure(sub_aperture(views, middle, sides[0]), "One view, from one side of the main lens", zoom=5)
+    section.figure(
+        sub_aperture(views, middle, sides[1]), parallax(views, sides, (alphas[0], alphas[2])), zoom=5
+    )
     section.text(
         "The raw image was decoded into views, one for each place on the main lens, and refocused by "
         "shearing the light field. The factor α' of each depth follows from the lens equation."

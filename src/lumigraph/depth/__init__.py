@@ -1,5 +1,6 @@
 """Depth from a light field.
 
+- `estimate`: one call for views, which `lumigraph.depth(views)` runs: the module itself can be called
 - `epi` (`pictures`, `sweep`, `lines`, `visible`, `vote`, `shading`): disparities by epipolar-plane images
 - `from_focus`: refocus factors by a focal stack; `BiasCurve` and `bias.unbiased` correct for diffraction
 - `correlation`, `dense`, `of_pixels` (`sightings`, `flat`): patch sizes of a plenoptic 2.0 camera
@@ -10,10 +11,12 @@
 """
 
 from lumigraph.core.depth_map import DepthMap
+from lumigraph.core.verb_module import make_callable
 from lumigraph.depth.bias import unbiased
 from lumigraph.depth.correlation import correlation
 from lumigraph.depth.dense import dense
 from lumigraph.depth.epi import epi
+from lumigraph.depth.estimate import estimate
 from lumigraph.depth.from_focus import BiasCurve, from_focus, point_alpha, sharpness
 from lumigraph.depth.fuse import fuse
 from lumigraph.depth.metric import cloud, defocus, metric, virtual_depth
@@ -32,6 +35,7 @@ __all__ = [
     "dense",
     "disparity_of",
     "epi",
+    "estimate",
     "from_focus",
     "fuse",
     "measurable",
@@ -43,3 +47,10 @@ __all__ = [
     "unbiased",
     "virtual_depth",
 ]
+
+make_callable(__name__, estimate)
+del make_callable
+
+
+def __dir__() -> list[str]:
+    return __all__

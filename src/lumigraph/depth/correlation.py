@@ -172,7 +172,7 @@ def _warn(taken: Sign, other: Sign) -> None:
         f"patches from {low:.3g} to {high:.3g} px explain the picture about as well as those from "
         f"{least:.3g} to {most:.3g} px, which are taken (scores of {other.overall:.2f} and "
         f"{taken.overall:.2f}): "
-        "textures that repeat do not show the sign. Give patches=(least, most), or --between least:most, if "
+        "textures that repeat do not show the sign. Give patches=(least, most), or --range least:most, if "
         "it is known: above 0 for a Keplerian camera, below for a Galilean one.",
         SamplingWarning,
         stacklevel=4,

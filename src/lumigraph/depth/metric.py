@@ -187,7 +187,7 @@ def cloud(
     *,
     object_distance: float,
     colours: Array | None = None,
-    lowest: float = 0.5,
+    min_confidence: float = 0.5,
     grid: Grid | None = None,
 ) -> PointCloud:
     """Points (z, y, x) in space [m] of a map of depths; the main lens' middle is the origin.
@@ -205,7 +205,7 @@ def cloud(
         Of the plane in focus from the main lens [m].
     colours
         Picture (y, x) or (y, x, 3) of the map's shape, uint8 or 0 to 1; None for none.
-    lowest
+    min_confidence
         Confidence below which a point is left out. 0.5 is an expected error of 0.45 px of `epi`, in the
         outermost view if that is less, and 0.55 px of `dense`.
     grid
@@ -220,7 +220,7 @@ def cloud(
     y, x, separation = _places(source, depth, grid)
     distance = to_numpy(depth.values).astype(float) + checks.positive("object_distance", object_distance)
     trust = to_numpy(depth.confidence)
-    kept = np.isfinite(distance) & (trust >= lowest)
+    kept = np.isfinite(distance) & (trust >= min_confidence)
     points = np.stack([distance, y * distance / separation, x * distance / separation], -1)[kept]
     paint = None if colours is None else _painted(colours, depth.shape)[kept]
     return PointCloud(points.astype(np.float32), paint, trust[kept].astype(np.float32))

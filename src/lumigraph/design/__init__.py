@@ -6,10 +6,21 @@
 - `microscope`: the light-field microscope, by depth
 - `layout`: the lengths that a ray diagram shows
 
-Distances are positive along the light unless a function says otherwise. "The thesis" in a source is the
-PhD thesis that this project started from; equations that are misprinted there are given corrected here.
+The module itself can be called: `lumigraph.design(camera)` gives all that follows from a camera, as
+`lumigraph design` prints it. Distances are positive along the light unless a function says otherwise.
+"The thesis" in a source is the PhD thesis that this project started from; equations that are misprinted
+there are given corrected here.
 """
 
+from lumigraph.core import upper_floors
+from lumigraph.core.verb_module import make_callable
 from lumigraph.design import microscope, plenoptic1, plenoptic2, resolution, thin_lens
 
 __all__ = ["microscope", "plenoptic1", "plenoptic2", "resolution", "thin_lens"]
+
+make_callable(__name__, upper_floors.design)
+del make_callable, upper_floors
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -48,3 +48,7 @@ __all__ = [
     "white_phase",
     "zernike",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

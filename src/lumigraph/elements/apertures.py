@@ -46,7 +46,7 @@ class CircularAperture:
     obstruction: bool = False
 
     def __post_init__(self) -> None:
-        checks.positive("diameter", self.diameter)
+        object.__setattr__(self, "diameter", checks.positive("diameter", self.diameter))
         object.__setattr__(self, "center", checks.pair("center", self.center))
         check_edge(self.edge)
 

@@ -1,6 +1,7 @@
 """Thin lens."""
 
 import math
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from lumigraph.core.grid import Grid
 from lumigraph.elements.apertures import CircularAperture
 from lumigraph.elements.transmission import Edge, check_edge, transmit, warn_if_coarse
 from lumigraph.errors import GeometryError
+
+_LONGEST, _WIDEST = 10.0, 1.0  # focal lengths in whole metres, and diameters [m], that no bench has
 
 
 def lens_phase(distance: np.ndarray, focal_length: float, wavelength: float) -> np.ndarray:
@@ -31,7 +34,8 @@ class ThinLens:
     Parameters
     ----------
     focal_length
-        [m]; negative for a diverging lens. A 0-d array such as a PyTorch scalar is differentiated through.
+        [m], or text such as "158 mm"; negative for a diverging lens. A 0-d array such as a PyTorch scalar is
+        differentiated through.
     diameter
         [m]; None for a lens as large as the field.
     center
@@ -62,12 +66,25 @@ class ThinLens:
     edge: Edge = "grey"
 
     def __post_init__(self) -> None:
-        if arrays.number(checks.parameter("focal_length", self.focal_length)) == 0:
+        object.__setattr__(self, "focal_length", checks.parameter("focal_length", self.focal_length))
+        if arrays.number(self.focal_length) == 0:
             raise GeometryError("focal_length is 0 m. Give a length, negative for a diverging lens.")
         if self.diameter is not None:
-            checks.positive("diameter", self.diameter)
+            object.__setattr__(self, "diameter", checks.positive("diameter", self.diameter))
         object.__setattr__(self, "center", checks.pair("center", self.center))
         check_edge(self.edge)
+        self._warn_of_metres()
+
+    def _warn_of_metres(self) -> None:
+        """Warn of a lens that was probably given in millimetres; computed lengths are no whole numbers."""
+        f, diameter = arrays.number(self.focal_length), self.diameter or 0.0
+        if diameter > _WIDEST or (abs(f) >= _LONGEST and float(f).is_integer()):
+            wide = f" and a diameter of {diameter:g} m" if diameter else ""
+            warnings.warn(
+                f"a lens has a focal length of {f:g} m{wide}. If millimetres are meant, write '{f:g} mm' or "
+                f"{f:g} * mm.",
+                stacklevel=4,
+            )
 
     def transmission(self, grid: Grid, wavelength: float) -> np.ndarray:
         """Complex factor (ny, nx) of each sample."""

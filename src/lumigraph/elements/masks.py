@@ -68,7 +68,7 @@ def random_phase_mask(
     ----------
     The thesis, section 3.4.3 and equation 3.7.
     """
-    checks.positive("wavelength", wavelength)
+    wavelength = checks.positive("wavelength", wavelength)
     if not 1 <= coherence_index <= min(grid.shape):
         raise GeometryError(
             f"coherence_index is {coherence_index} but must lie between 1 and {min(grid.shape)}, "

@@ -80,7 +80,7 @@ class Objective:
     image_defocus: float = 0.0
 
     def __post_init__(self) -> None:
-        checks.positive("wavelength", self.wavelength)
+        object.__setattr__(self, "wavelength", checks.positive("wavelength", self.wavelength))
         checks.choice("model", self.model, get_args(Model))
         if not checks.positive("numerical_aperture", self.numerical_aperture, "1") < self.index:
             raise GeometryError(

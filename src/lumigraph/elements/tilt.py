@@ -34,7 +34,7 @@ class TiltAndBow:
     sensor: Pair = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        checks.finite("bow", self.bow)
+        object.__setattr__(self, "bow", checks.finite("bow", self.bow))
         for name in ("array", "sensor"):
             if (
                 steepest := max(map(abs, checks.pair(f"the tilt of the {name}", getattr(self, name))))

@@ -198,7 +198,7 @@ class ZernikePlate:
         for j, value in pairs:
             checks.finite(f"coefficient {j}", value, "rad rms")
         object.__setattr__(self, "coefficients", tuple((int(j), float(value)) for j, value in pairs))
-        checks.positive("diameter", self.diameter)
+        object.__setattr__(self, "diameter", checks.positive("diameter", self.diameter))
         object.__setattr__(self, "center", checks.pair("center", self.center))
         check_edge(self.edge)
         object.__setattr__(self, "axes", checks.pair("axes", self.axes))

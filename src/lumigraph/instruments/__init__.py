@@ -53,3 +53,7 @@ __all__ = [
     "catalogue",
     "load_camera",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

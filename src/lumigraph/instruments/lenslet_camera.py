@@ -9,7 +9,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from lumigraph.core import arrays, checks
+from lumigraph.core import arrays, checks, picture
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.grid import Grid
@@ -26,6 +26,7 @@ from lumigraph.instruments.built import Built
 from lumigraph.instruments.lenslets import Lenslets
 from lumigraph.instruments.making import Making
 from lumigraph.instruments.parameters import Parameter, optional
+from lumigraph.instruments.parts import check_pixels
 from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.tolerances import Tolerances
 from lumigraph.instruments.with_parts import CameraGradients
@@ -279,7 +280,10 @@ class LensletCamera(CameraGradients):
         # Micro-images can be wider than their pitch, where the main lens is too large.
         excess = max(0.0, self.micro_image_width - self.micro_image_pitch) / 2
         half = [(reach * spread + excess) / self.pixels.pixel_pitch for reach in self.lenslets.reach]
-        return 2 * math.ceil(half[0] - 0.5) + 1, 2 * math.ceil(half[1] - 0.5) + 1
+        shape = 2 * math.ceil(half[0] - 0.5) + 1, 2 * math.ceil(half[1] - 0.5) + 1
+        lengths = picture.length(self.lenslets.pitch), picture.length(self.pixels.pixel_pitch)
+        check_pixels(shape, "Check lenslets.pitch ({}) and sensor.pixel_pitch ({}).".format(*lengths))
+        return shape
 
     @cached_property
     def sampling(self) -> grids.Sampling:

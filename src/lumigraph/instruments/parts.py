@@ -141,10 +141,10 @@ class Pixels(CameraTable):
         return Sensor(shape, **given)
 
 
-def check_pixels(shape: tuple[int, int]) -> None:
-    """Refuse a sensor that no computer would simulate."""
+def check_pixels(shape: tuple[int, int], cause: str = "") -> None:
+    """Refuse a sensor that no computer would simulate; `cause` names the keys that it follows from."""
     if math.prod(shape) > MOST_PIXELS:
         raise GeometryError(
             f"{shape[0]} x {shape[1]} = {math.prod(shape):.3g} pixels are more than the {MOST_PIXELS:.3g} "
-            "that can be simulated. Use fewer or larger pixels."
+            f"that can be simulated. {cause or 'Use fewer or larger pixels.'}"
         )

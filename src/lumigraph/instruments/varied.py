@@ -9,6 +9,7 @@ from typing import Any
 from lumigraph.errors import FormatError
 from lumigraph.instruments.files import write
 from lumigraph.instruments.instrument import Instrument
+from lumigraph.units import spaced
 
 MOST = 100_000
 """Combinations."""
@@ -18,30 +19,22 @@ NUMBER = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\D*)")
 
 
 def values(text: str) -> tuple[str, list[Any]]:
-    """A key of the camera file and the values after it: of a range evenly spaced, one in its middle.
+    """A key of the camera file and the values after it: several, or a range as `units.spaced` reads it.
 
-    >>> values("lenslets.focal_length=4 mm:6 mm:3")
+    >>> values("lenslets.focal_length=4 mm:6 mm:x3")
     ('lenslets.focal_length', ['4 mm', '5 mm', '6 mm'])
     >>> values("lenslets.layout=square, hex")[1], values("lenslets.magnification=0.3,0.5")[1]
     (['square', 'hex'], [0.3, 0.5])
-    >>> values("lenslets.focal_length=4 mm:6 mm:1")[1]
+    >>> values("lenslets.focal_length=4 mm:6 mm:x1")[1]
     ['5 mm']
     """
     name, equals, words = text.partition("=")
     parts = [word.strip() for word in words.split(":")]
     if not (equals and name.strip() and all(parts)):
-        raise FormatError(f"--vary is {text!r} but must be like 'lenslets.focal_length=4 mm:6 mm:9'.")
+        raise FormatError(f"--vary is {text!r} but must be like 'lenslets.focal_length=4 mm:6 mm:x9'.")
     if len(parts) == 1:
         return name.strip(), [_number(word.strip()) for word in words.split(",")]
-    ends = [NUMBER.fullmatch(part) for part in parts[:2]]
-    if len(parts) != 3 or None in ends or not parts[2].isdecimal() or not 1 <= int(parts[2]) <= MOST:
-        raise FormatError(f"--vary {text!r} must be 'first:last:count', with a count from 1 to {MOST}.")
-    (first, unit), (last, other) = (end.groups() for end in ends if end)
-    if unit != other:
-        raise FormatError(f"--vary {text!r} has two units. Give first and last in the same one.")
-    count = int(parts[2])
-    steps = [k / (count - 1) for k in range(count)] if count > 1 else [0.5]
-    numbers = (float(first) + (float(last) - float(first)) * step for step in steps)
+    numbers, unit = spaced(words, f"--vary {name.strip()}", MOST)
     return name.strip(), [
         f"{number:.10g} {unit}" if unit else _number(f"{number:.10g}") for number in numbers
     ]

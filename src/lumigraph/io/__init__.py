@@ -42,3 +42,7 @@ __all__ = [
     "save",
     "save_calibration",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -83,7 +83,7 @@ FORMATS = (
     Format("Lytro ESLF", _ESLF[:2], "eslf", ("LightField",), ("LightField",), ("views",)),
     Format("Lytro ESLF, JPEG", _ESLF[2:], "eslf", (), ("LightField",), ("views",)),
     Format("PNG", (".png",), "png", ("RawImage",), ("RawImage",), ("views",)),
-    Format("JPEG", (".jpg", ".jpeg"), "jpeg", (), ("RawImage",), ("views",)),
+    Format("JPEG", (".jpg", ".jpeg"), "jpeg", ("RawImage",), ("RawImage",), ("views",)),
     Format("BMP", (".bmp",), "bmp", (), ("RawImage",), ("views",)),
     Format("PGM, PPM", (".pgm", ".ppm", ".pnm"), "pnm", (), ("RawImage",), ("views",)),
     Format("Zarr", (".zarr", ".zarr.zip"), "zarr", _STORED, _STORED, ("page",)),
@@ -316,7 +316,8 @@ def save(
 
     Integers are written as they are. Floats go into TIFF, HDF5 and Zarr as they are (a bare array into
     TIFF as float32); into PNG and films, which hold whole numbers, 0 ... `white` becomes 0 ... 65535
-    (grey PNG) or 0 ... 255 (colour, films) and what lies outside is clipped.
+    (grey PNG) or 0 ... 255 (colour, films, JPEG) and what lies outside is clipped. JPEG, of quality 95, loses
+    detail.
 
     Parameters
     ----------
@@ -326,14 +327,14 @@ def save(
     path
         File whose ending says which format; a light field goes into a folder of views where it has none.
     white
-        Float that becomes white in a PNG or a film; the maximum if left out.
+        Float that becomes white in a PNG, a JPEG or a film; the maximum if left out.
     fps
         Pictures per second of a film (GIF, MP4); 10 if left out.
 
     Raises
     ------
     FormatError
-        A format that cannot hold the thing, or a folder that does not exist.
+        A format that cannot hold the thing, or a folder that may not be written to.
     """
     row = format_of(path)
     if not isinstance(thing, DepthMap) or "DepthMap" not in row.writes:
@@ -344,7 +345,7 @@ def save(
         raise FormatError(
             f"{path} has the wrong extension for this result, a {noun}. Use one of {', '.join(fitting)}."
         )
-    options = {"white": white} if row.module in ("png", "movie", "eslf", "views") else {}
+    options = {"white": white} if row.module in ("png", "jpeg", "movie", "eslf", "views") else {}
     if row.module == "movie" and fps is not None:
         options["fps"] = fps
     elif fps is not None:

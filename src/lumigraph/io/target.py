@@ -32,16 +32,13 @@ def check_target(path: str | os.PathLike[str], endings: Sequence[str] = (), *, f
     Raises
     ------
     FormatError
-        Another extension, a folder that is missing or may not be written to, or a folder in the way.
+        Another extension, a folder that may not be written to, or a folder in the way.
     """
     path = Path(path)
     name = path.name.lower()
     if endings and not name.endswith(tuple(endings)):
         raise FormatError(f"{path} has the wrong extension for this result. Use one of {', '.join(endings)}.")
-    if not path.parent.is_dir():
-        raise FormatError(f"the folder {path.parent} for {path.name} does not exist. Make it first.")
-    if not os.access(path.parent, os.W_OK):
-        raise FormatError(f"the folder {path.parent} may not be written to. Choose another one.")
+    check_parent(path)
     if folder:
         if path.is_dir() and any(path.iterdir()) and not (path / VIEWS).is_file():
             raise FormatError(f"{path} is a folder that holds other things. Choose another name.")
@@ -53,6 +50,21 @@ def check_target(path: str | os.PathLike[str], endings: Sequence[str] = (), *, f
         raise FormatError(f"{path} is a folder that holds no Zarr store. Choose another name.")
     _check_foreign(path, _is_zarr)
     return path
+
+
+def check_parent(path: Path) -> None:
+    """Refuse an output whose folder may not be written to; one that does not exist is made when it is needed.
+
+    Raises
+    ------
+    FormatError
+        The nearest folder above may not be written to, or is a file.
+    """
+    nearest = next((one for one in path.absolute().parents if one.exists()), path.parent)
+    if not nearest.is_dir():
+        raise FormatError(f"{nearest} is a file, not a folder for {path.name}. Choose another one.")
+    if not os.access(nearest, os.W_OK):
+        raise FormatError(f"the folder {nearest} may not be written to. Choose another one.")
 
 
 def _is_zarr(entry: Path) -> bool:

@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from scipy.stats import chi2
 
 from lumigraph.analysis import pupil_edge
 from lumigraph.calibration import calibrate
-from lumigraph.core import checks
+from lumigraph.core import checks, upper_floors
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
@@ -274,7 +275,7 @@ def shown(white: np.ndarray) -> _ShownWhite:
 
 def twin(
     whites: Sequence[RawImage],
-    camera: LensletCamera | BenchModel,
+    camera: LensletCamera | BenchModel | str | PathLike[str],
     *,
     dark: RawImage | None = None,
     pitch_error: float | None = None,
@@ -303,6 +304,7 @@ def twin(
         No white images, or of another size than the camera's sensor; micro-images without edges; a lattice
         that is not the camera's.
     """
+    camera = upper_floors.camera(camera)
     bench = camera if isinstance(camera, BenchModel) else BenchModel(camera)
     known = PITCH_ERROR if pitch_error is None else checks.positive("pitch_error", pitch_error, "1")
     seen = _mean([shown(_bare(one, dark, bench.camera)) for one in whites])

@@ -51,3 +51,7 @@ __all__ = [
     "periodic_operator",
     "single_lens_operator",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

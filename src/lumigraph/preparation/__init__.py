@@ -38,3 +38,7 @@ __all__ = [
     "super_resolve",
     "vignetting",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

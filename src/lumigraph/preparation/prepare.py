@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
+from os import PathLike
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from lumigraph import rendering
 from lumigraph.calibration import aligned, calibrate
 from lumigraph.calibration.devignette import as_raw, divided
+from lumigraph.core import upper_floors
 from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.prepared import PreparedImage, Reason, Verdicts
@@ -35,7 +37,7 @@ def prepare(
     *,
     white: RawImage | Array | None = None,
     dark: RawImage | Array | None = None,
-    camera: Described | None = None,
+    camera: Described | str | PathLike[str] | None = None,
     mask: Array | None = None,
     divide: bool = True,
 ) -> PreparedImage:
@@ -89,6 +91,7 @@ def prepare(
     >>> ready.valid.shape == camera.sensor.shape, ready.notes[0]
     (True, 'the lattice is that of the camera file')
     """
+    camera = upper_floors.camera(camera)
     beside = ReferenceImages(*(None if one is None else as_raw(one) for one in (white, dark)))
     raw = as_raw(raw)
     beside.check(raw)

@@ -16,3 +16,7 @@
 from lumigraph.propagation.propagate import METHODS, Choice, Propagate, choose_method, propagate
 
 __all__ = ["METHODS", "Choice", "Propagate", "choose_method", "propagate"]
+
+
+def __dir__() -> list[str]:
+    return __all__

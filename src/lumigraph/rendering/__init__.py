@@ -27,7 +27,7 @@ from lumigraph.rendering.views import (
     lenslet_mosaic,
     point_of_view,
     reduce_aperture,
-    view,
+    sub_aperture,
     views_from_mosaic,
     views_mosaic,
 )
@@ -55,9 +55,13 @@ __all__ = [
     "rendered_grid",
     "sharp_patches",
     "sight_grid",
+    "sub_aperture",
     "super_resolve",
-    "view",
     "view_path",
     "views_from_mosaic",
     "views_mosaic",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

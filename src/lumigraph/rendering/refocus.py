@@ -16,6 +16,7 @@ from lumigraph.core.progress import Progress
 from lumigraph.errors import GeometryError
 from lumigraph.rendering.geometry import lit
 from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, take, taps, weighted
+from lumigraph.rendering.views import reduce_aperture
 
 _BLOCK = 10_000  # values summed at a time: they stay in the cache, and BLAS keeps to one thread
 _LEAST_VALID = 0.3  # of the light that would be seen without the mask of valid samples
@@ -23,7 +24,12 @@ _LEAST_SEEN = 0.05  # of one view; places that less light reaches stay dark
 
 
 def refocus(
-    views: LightField[A], alpha: float, *, interpolation: Interpolation = "cubic", oversample: int = 1
+    views: LightField[A],
+    alpha: float,
+    *,
+    aperture: float = 1.0,
+    interpolation: Interpolation = "cubic",
+    oversample: int = 1,
 ) -> A:
     r"""Picture (t, s[, c]) focused on the plane whose image lies at F' = F / alpha behind the main lens.
 
@@ -41,6 +47,9 @@ def refocus(
         Decoded light field.
     alpha
         F / F', above 0.
+    aperture
+        Width of the aperture that is used, relative to all of it: smaller is sharper in depth, and noisier;
+        see `reduce_aperture` for other shapes.
     interpolation
         "cubic", "linear" or "band_limited", between lenslets.
     oversample
@@ -61,13 +70,17 @@ def refocus(
     shear written for alpha' = F / F' as in the thesis' equation 4.7 (its 4.10 moves the focus the wrong way).
     """
     checks.positive("alpha", alpha, "1")
-    return refocus_stack(views, [alpha], interpolation=interpolation, oversample=oversample)[0, ...]
+    found = refocus_stack(
+        views, [alpha], aperture=aperture, interpolation=interpolation, oversample=oversample
+    )
+    return found[0, ...]
 
 
 def refocus_stack(
     views: LightField[A],
     alphas: Sequence[float] | np.ndarray,
     *,
+    aperture: float = 1.0,
     interpolation: Interpolation = "cubic",
     oversample: int = 1,
     progress: Progress | None = None,
@@ -79,7 +92,7 @@ def refocus_stack(
 
     Parameters
     ----------
-    views, interpolation, oversample
+    views, aperture, interpolation, oversample
         As for `refocus`.
     alphas
         F / F' of each picture, above 0.
@@ -88,6 +101,8 @@ def refocus_stack(
     """
     checks.instance("views", views, LightField)
     check_interpolation(interpolation)
+    if aperture != 1:
+        views = reduce_aperture(views, aperture)
     if not isinstance(alphas, Sequence | np.ndarray) or np.ndim(alphas) != 1:
         raise GeometryError(f"alphas is {alphas!r} but must be a list of numbers such as 1.0.")
     alphas = [checks.positive("alpha", alpha, "1") for alpha in alphas]

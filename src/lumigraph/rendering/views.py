@@ -13,8 +13,8 @@ from lumigraph.errors import GeometryError
 from lumigraph.rendering.interpolate import as_float, neighbours
 
 
-def view(views: LightField[A], v: int, u: int) -> A:
-    """Picture (t, s[, c]) seen from view (v, u) of the aperture; negative indices count from the end.
+def sub_aperture(views: LightField[A], v: int, u: int) -> A:
+    """Sub-aperture image (t, s[, c]) seen from view (v, u) of the aperture; negative indices from the end.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def point_of_view(views: LightField[A], y: float, x: float) -> A:
     checks.instance("views", views, LightField)
     grid, places = views.aperture, []
     for name, value, positions in zip("yx", (y, x), (grid.y, grid.x), strict=True):
-        checks.finite(name, value)
+        value = checks.finite(name, value)
         if not positions[0] - 1e-9 * abs(positions[0]) <= value <= positions[-1] + 1e-9 * abs(positions[-1]):
             raise GeometryError(
                 f"{name} is {value:.4g} m but the views lie between {positions[0]:.4g} and "

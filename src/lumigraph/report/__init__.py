@@ -8,3 +8,7 @@
 from lumigraph.report.page import Page, Section
 
 __all__ = ["Page", "Section"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -94,7 +94,7 @@ class ExtendedSource:
 
     def __post_init__(self) -> None:
         if self.distance != math.inf:
-            checks.finite("distance", self.distance)
+            object.__setattr__(self, "distance", checks.finite("distance", self.distance))
         if self.distance == 0:
             raise GeometryError(
                 "distance is 0 m: the plane lies in the source. Give a distance, or math.inf for collimated "

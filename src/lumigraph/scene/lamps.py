@@ -174,7 +174,7 @@ def fewest(rows: np.ndarray, columns: np.ndarray, accuracy: float, dtype: Any) -
 def check(grid: Grid, wavelength: float, accuracy: float) -> None:
     """Refuse what modes cannot be sampled on, or to."""
     checks.instance("grid", grid, Grid)
-    checks.positive("wavelength", wavelength)
+    wavelength = checks.positive("wavelength", wavelength)
     if not 0 < checks.finite("accuracy", accuracy, "1") < 1:
         raise GeometryError(f"accuracy is {accuracy:g} but must lie between 0 and 1.")
 

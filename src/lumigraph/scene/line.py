@@ -60,8 +60,8 @@ class SpectralLine:
     profile: str = "gaussian"
 
     def __post_init__(self) -> None:
-        checks.positive("wavelength", self.wavelength)
-        checks.positive("width", self.width)
+        object.__setattr__(self, "wavelength", checks.positive("wavelength", self.wavelength))
+        object.__setattr__(self, "width", checks.positive("width", self.width))
         checks.choice("profile", self.profile, ("gaussian", "even"), GeometryError)
         if self.width > self.wavelength / 5:
             raise GeometryError(

@@ -74,7 +74,7 @@ class GaussianSchell:
 
     def rayleigh_range(self, wavelength: float) -> Pair:
         """Distance (y, x) over which the width grows by √2, 4πσI²/(λM²) [m]."""
-        checks.positive("wavelength", wavelength)
+        wavelength = checks.positive("wavelength", wavelength)
         quality = self.beam_quality
         widths = self._each(lambda width, _: 4 * math.pi * width**2 / wavelength)
         return widths[0] / quality[0], widths[1] / quality[1]
@@ -135,7 +135,7 @@ class GaussianSchell:
     ) -> CoherentModes:
         """Modes as of `modes`, on a grid that may be smaller than the light, such as a lit slice."""
         check(grid, wavelength, accuracy)
-        checks.finite("distance", distance)
+        distance = checks.finite("distance", distance)
         orders, weights, error = self._chosen(grid, accuracy, np.dtype(dtype).itemsize)
         rows, columns = (
             _beams(axis, int(most) + 1, waist, wavelength, distance).astype(dtype)

@@ -135,7 +135,7 @@ def gaussian_beam(
     1.0
     """
     _check(grid, wavelength)
-    checks.positive("waist", waist)
+    waist = checks.positive("waist", waist)
     k, start = 2 * np.pi / wavelength, -1j * np.pi * waist**2 / wavelength
     q = checks.finite("distance", distance) + start
     along = [np.exp(1j * k * np.square(c) / (2 * q)) for c in (grid.y, grid.x)]
@@ -145,7 +145,7 @@ def gaussian_beam(
 def _check(grid: Grid, wavelength: float) -> None:
     """Refuse what is no grid or wavelength, or a wave that would not fit in memory."""
     checks.instance("grid", grid, Grid)
-    checks.positive("wavelength", wavelength)
+    wavelength = checks.positive("wavelength", wavelength)
     memory.require_plane(grid.shape, 32, "a wave")
 
 

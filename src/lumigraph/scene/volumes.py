@@ -63,7 +63,7 @@ class Slice:
                 f"a slice has shape {shape} but must be (y, x) or (y, x, c) with (y, x) = {self.grid.shape} "
                 "of its grid."
             )
-        checks.finite("dz", self.dz)
+        object.__setattr__(self, "dz", checks.finite("dz", self.dz))
         _check_intensity("a slice", self.intensity)
         if self.opacity is not None:
             object.__setattr__(self, "opacity", _opacity(self.opacity, self.grid))

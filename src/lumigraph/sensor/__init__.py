@@ -11,3 +11,7 @@ from lumigraph.sensor.pixels import integrate, integrate_adjoint
 from lumigraph.sensor.sensor import Sensor
 
 __all__ = ["AngularResponse", "Sensor", "demosaic", "integrate", "integrate_adjoint", "levels", "mosaic"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -103,7 +103,7 @@ class Sensor:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", checks.shape("shape", self.shape))
-        checks.positive("pixel_pitch", self.pixel_pitch)
+        object.__setattr__(self, "pixel_pitch", checks.positive("pixel_pitch", self.pixel_pitch))
         checks.positive("full_well", self.full_well, "electrons")
         for name, unit in _NOT_NEGATIVE.items():
             if checks.finite(name, getattr(self, name), unit) < 0:

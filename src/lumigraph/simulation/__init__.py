@@ -36,3 +36,7 @@ __all__ = [
     "plane_views",
     "simulate",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

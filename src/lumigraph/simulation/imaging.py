@@ -3,11 +3,13 @@
 import math
 from builtins import map as serial_map
 from collections.abc import Callable, Iterable
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
-from lumigraph.core import checks, memory
+from lumigraph.core import checks, memory, upper_floors
+from lumigraph.core.arrays import Array
 from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as share
 from lumigraph.core.raw import RawImage
@@ -15,6 +17,7 @@ from lumigraph.core.volume import Volume
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators.periodic.coherent import is_followed
 from lumigraph.scene import Medium, Points, Scene, Slice
+from lumigraph.scene.targets import photo
 from lumigraph.simulation import error
 from lumigraph.simulation.camera import ImagedCamera, Imaging
 from lumigraph.simulation.coherence import (
@@ -48,8 +51,8 @@ class Interrupted(KeyboardInterrupt):
 
 
 def simulate(
-    camera: ImagedCamera | Microscope,
-    scene: Scene | Volume,
+    camera: ImagedCamera | Microscope | str | PathLike[str],
+    scene: Scene | Volume | Array,
     coherence: Coherence | Incoherent | PartiallyCoherent | None = None,
     *,
     spectrum: Spectrum | None = None,
@@ -72,9 +75,10 @@ def simulate(
     Parameters
     ----------
     camera
-        Any instrument.
+        Any instrument, its file, or a name of the catalogue.
     scene
-        Slices, points and diffusers; see `lumigraph.targets`. Or a `Volume`, whose planes are slices.
+        Slices, points and diffusers; see `lumigraph.targets`. Or a `Volume`, whose planes are slices; or a
+        picture (y, x[, c]) as an array, as large as fits into the scene's grid, see `targets.photo`.
     coherence
         For slices: `Incoherent` (default), `Coherent`, `PartiallyCoherent`, `Snapshots` or `TiltedWaves`. The
         last two leave the raw image's relative rms error, estimated from the spread of blocks of their
@@ -100,7 +104,10 @@ def simulate(
     Interrupted
         A KeyboardInterrupt; it carries the raw image of what was finished.
     """
+    camera = upper_floors.camera(camera)
     coherence = Incoherent() if coherence is None else coherence
+    if hasattr(scene, "dtype"):
+        scene = photo(camera.scene_grid, scene)
     if isinstance(scene, Volume):
         planes = zip(scene.data, scene.depths, strict=True)
         scene = Scene(Slice(plane, scene.grid, dz) for plane, dz in planes)

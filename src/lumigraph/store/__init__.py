@@ -3,6 +3,7 @@
 - `cabinet`: arrays kept between runs under a key, in the user's cache folder or another; a budget in bytes
 - `sealed`: one file of arrays with a checksum over every byte, read as memory maps
 - `notes`: one JSON value in a file, with such a checksum
+- `written`: which command wrote a file
 - `atomic`: writing a file or a folder in one step; what killed writers left is removed at the next one
 
 A kill at any moment leaves the old content or the new. What is read back is compared with its checksum
@@ -14,12 +15,14 @@ from lumigraph.store.array_cache import LIMIT, folder, kept
 from lumigraph.store.atomic import replacing, restored, sweep, write_bytes
 from lumigraph.store.notes import read_note, write_note
 from lumigraph.store.sealed import DamagedError, read, write
+from lumigraph.store.written import note_writer, writer_of
 
 __all__ = [
     "LIMIT",
     "DamagedError",
     "folder",
     "kept",
+    "note_writer",
     "read",
     "read_note",
     "replacing",
@@ -28,4 +31,9 @@ __all__ = [
     "write",
     "write_bytes",
     "write_note",
+    "writer_of",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -67,7 +67,8 @@ def replacing(path: str | os.PathLike[str], *, flush: bool = True) -> Iterator[P
     """Context that gives a temporary path, which takes the place of `path` at the end.
 
     The temporary path does not exist yet: write a file there, or make a folder. If the block fails it
-    is removed and what was at `path` stays. The new file takes over the old one's mode and group.
+    is removed and what was at `path` stays. The new file takes over the old one's mode and group. Folders
+    above it that do not exist are made.
 
     Raises
     ------
@@ -77,6 +78,8 @@ def replacing(path: str | os.PathLike[str], *, flush: bool = True) -> Iterator[P
     target = Path(path)
     if target.is_symlink():
         target = target.resolve()
+    with _told(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
     with _told(target), _workplace(target.parent) as place:
         # A folder in between: encoders read the ending, and a name of 255 bytes cannot be lengthened.
         temporary = place / _NEW

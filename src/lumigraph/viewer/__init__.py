@@ -22,6 +22,7 @@ from lumigraph.viewer.inline import view_inline
 from lumigraph.viewer.opening import Origin, open_exhibit
 from lumigraph.viewer.page import site
 from lumigraph.viewer.server import Resource, Site, serve
+from lumigraph.viewer.show import open_in_browser, show
 from lumigraph.viewer.single_file import export
 
 __all__ = [
@@ -34,9 +35,15 @@ __all__ = [
     "export",
     "export_folder",
     "open_exhibit",
+    "open_in_browser",
     "redirecting",
     "serve",
     "serve_folder",
+    "show",
     "site",
     "view_inline",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

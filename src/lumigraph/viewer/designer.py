@@ -106,7 +106,7 @@ def _depth_slider(camera: Instrument) -> dict[str, Any]:
 
 def _depth(given: dict[str, Any]) -> float:
     dz = given.get("dz", 0.0)
-    checks.finite("dz", dz, error=FormatError)
+    dz = checks.finite("dz", dz, error=FormatError)
     if abs(dz) > _FARTHEST:
         raise GeometryError(f"dz is {dz:g} m, beyond {_FARTHEST:g} m. Use a nearer point.")
     return float(dz)

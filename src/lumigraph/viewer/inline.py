@@ -67,11 +67,12 @@ def view_inline(
     ``lumigraph.view_inline(views)``
     """
     height = checks.whole("height", height, error=FormatError)
-    text, _ = exported([_exhibit(thing, calibration)], quality)
+    text, _ = exported([exhibit_of(thing, calibration)], quality)
     return InlinePage(text, height)
 
 
-def _exhibit(thing: Any, calibration: Calibration | None) -> Exhibit:
+def exhibit_of(thing: Any, calibration: Calibration | None) -> Exhibit:
+    """Exhibit of something in memory; refused if it has no picture."""
     if isinstance(thing, RawImage):
         return opening.of_raw("raw image", thing, calibration)
     if calibration is not None:

@@ -152,8 +152,8 @@ def test_the_command_goes_downhill_along_them(tmp_path, capsys):
     """Two keys, five cameras: to a wider stop, which gathers more light and tells depths better."""
     file, best = tmp_path / "camera.toml", tmp_path / "best.toml"
     file.write_text(camera(TWO).to_toml())
-    words = ["--vary", "main_lens.aberrations.6=0:1:1", "--vary", "main_lens.diameter=2 mm:3 mm:1"]
-    words += ["--depths", "-4 mm", "--places", "1", "--search", "gradient", "--evaluations", "3"]
+    words = ["--vary", "main_lens.aberrations.6=0:1:x1", "--vary", "main_lens.diameter=2 mm:3 mm:x1"]
+    words += ["--depth", "-4 mm", "--places", "1", "--search", "gradient", "--evaluations", "3"]
     assert main(["optimise", str(file), *words, "-o", str(best), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["best"]["depth"] < 0.95 * told["start"]["depth"]

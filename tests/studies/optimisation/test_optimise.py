@@ -23,15 +23,15 @@ from lumigraph.studies.optimisation.space import Space
 
 SCOPE, CAMERA = "lfm-fourier", "thesis-plenoptic-2-m050"
 DEPTHS = (-10e-6, 10e-6)
-VARY = {"fourier_lens": "60 mm:90 mm:2"}
+VARY = {"fourier_lens": "60 mm:90 mm:x2"}
 
 
 @pytest.mark.parametrize("search", ["local", "global"])
 def test_a_number_with_a_known_optimum_is_found(search):
     """Cross-talk sqrt(2.44 λ b)/p falls with f: the least of b = f (1 + m) is at both ranges' low ends."""
     vary = {
-        "lenslets.magnification": "0.3:0.6:3",
-        "lenslets.focal_length": "5 mm:6 mm:2",
+        "lenslets.magnification": "0.3:0.6:x3",
+        "lenslets.focal_length": "5 mm:6 mm:x2",
         "lenslets.pitch": "140 um, 150 um",
     }
     found = lg.optimise(CAMERA, vary, "least cross-talk", search=search, evaluations=60)
@@ -43,7 +43,7 @@ def test_a_number_with_a_known_optimum_is_found(search):
 
 
 def test_the_largest_is_the_other_end():
-    vary = {"lenslets.magnification": "0.3:0.6:3"}
+    vary = {"lenslets.magnification": "0.3:0.6:x3"}
     seen = []
     found = lg.optimise(CAMERA, vary, "largest cross-talk", evaluations=20, progress=seen.append)
     assert seen == sorted(seen)
@@ -54,7 +54,7 @@ def test_the_largest_is_the_other_end():
 
 def test_a_front_of_two_goals_is_where_neither_can_be_better(tmp_path, capsys):
     """The shorter focal length is better in both; the magnification trades one for the other."""
-    vary = {"lenslets.magnification": "0.3:0.6:3", "lenslets.focal_length": "5 mm:6 mm:2"}
+    vary = {"lenslets.magnification": "0.3:0.6:x3", "lenslets.focal_length": "5 mm:6 mm:x2"}
     goals = {"goal": "least cross-talk", "against": "least lateral resolution"}
     found = lg.optimise(CAMERA, vary, **goals, evaluations=40)
     assert len(found.rows) <= 1 + 6 + 80
@@ -106,7 +106,7 @@ def test_a_front_whose_middle_is_hollow_is_reached_between_its_ends():
                 self.rows.append(self.seen[str(item)])
             return self.seen[str(item)]
 
-    space, goals = Space.of(["a=0:1:2"]), (Goal("y"), Goal("z"))
+    space, goals = Space.of(["a=0:1:x2"]), (Goal("y"), Goal("z"))
     cameras = Hollow(space, None)
     for item in space.combinations():
         cameras.row(item)
@@ -119,7 +119,7 @@ def test_a_front_whose_middle_is_hollow_is_reached_between_its_ends():
 
 @pytest.mark.parametrize("search", ["local", "global"])
 def test_a_least_between_the_first_values_is_found_beside_what_cannot_be(search):
-    space = Space.of(["a=1 mm:3 mm:3", "b=0:1:3"])
+    space = Space.of(["a=1 mm:3 mm:x3", "b=0:1:x3"])
     known = Known(space, (0.63, 0.3))
     first = grid(known, space)
     found = refined(known, space, first, (search, 400, 1))
@@ -150,7 +150,7 @@ def test_the_best_bound_carries_the_error_of_its_derivatives():
     assert over_depths == pytest.approx(again.of("lateral"), rel=1e-9)
     assert error >= np.max(again.errors) > 0
     assert error >= abs(rough["lateral"] / value - 1) > 0
-    exact = lg.optimise(SCOPE, {"fourier_lens": "60 mm:90 mm:1"}, depths=(2e-6,), search="grid")
+    exact = lg.optimise(SCOPE, {"fourier_lens": "60 mm:90 mm:x1"}, depths=(2e-6,), search="grid")
     assert (
         exact.checked["best"]
         == exact.checked["swept"]
@@ -196,7 +196,7 @@ def test_a_search_starts_from_the_camera_given_too(monkeypatch):
 
     monkeypatch.setattr(Goal, "values", two_valleys)
     monkeypatch.setattr(Goal, "checked", lambda *given: JudgedBound(given[-1]["depth"], 0.0, np.zeros(2)))
-    found = lg.optimise(scope, {"fourier_lens": "50 mm:100 mm:2"}, depths=DEPTHS, evaluations=40)
+    found = lg.optimise(scope, {"fourier_lens": "50 mm:100 mm:x2"}, depths=DEPTHS, evaluations=40)
     assert found.swept["fourier_lens"] == "100 mm"
     assert found.camera.fourier_lens == pytest.approx(77e-3, rel=2e-3)
     assert len(found.rows) <= 1 + 2 + 40
@@ -282,7 +282,7 @@ def test_a_search_goes_on_with_more_evaluations_from_what_is_noted(tmp_path, mon
 
     plain, calls = goals.Goal.values, []
     monkeypatch.setattr(goals.Goal, "values", lambda self, *given: calls.append(given) or plain(self, *given))
-    vary, goal = {"lenslets.magnification": "0.3:0.7:3"}, "least cross-talk"
+    vary, goal = {"lenslets.magnification": "0.3:0.7:x3"}, "least cross-talk"
     whole = lg.optimise(CAMERA, vary, goal, evaluations=12)
     calls.clear()
     few = lg.optimise(CAMERA, vary, goal, evaluations=5, output=tmp_path / "best.toml")
@@ -296,7 +296,7 @@ def test_a_search_goes_on_with_more_evaluations_from_what_is_noted(tmp_path, mon
 
 
 def test_ranges_and_stock_are_told_apart():
-    space = Space.of(["a=1 mm:3 mm:3", "b=4, 5"])
+    space = Space.of(["a=1 mm:3 mm:x3", "b=4, 5"])
     assert space.moved({"a": "1 mm", "b": 4}, [0.25]) == {"a": "1.5 mm", "b": 4}
     assert space.parts({"a": "2 mm", "b": 5}) == [0.5]
     assert space.active({"a": "3 mm", "b": 5}) == {"a": "3 mm"}
@@ -305,9 +305,9 @@ def test_ranges_and_stock_are_told_apart():
 @pytest.mark.parametrize(
     ("vary", "goal", "said"),
     [
-        ({"fourier_lens": "nan mm:90 mm:2"}, "depth", "first:last:count"),
-        ({"fourier_lens": "90 mm:60 mm:2"}, "depth", "must go up"),
-        ({"fourier_lense": "60 mm:90 mm:2"}, "depth", "fourier_lense"),
+        ({"fourier_lens": "nan mm:90 mm:x2"}, "depth", "first:last:xN"),
+        ({"fourier_lens": "90 mm:60 mm:x2"}, "depth", "must go up"),
+        ({"fourier_lense": "60 mm:90 mm:x2"}, "depth", "fourier_lense"),
         (VARY, "depht", "--goal is 'depht'"),
         (VARY, "largest luck", "no number 'luck'"),
         (VARY, "largest mtf@10/mm", "light-field-microscope"),
@@ -331,8 +331,8 @@ def test_the_verb_writes_a_camera_and_says_before_and_after(tmp_path, capsys):
         "optimise",
         SCOPE,
         "--vary",
-        "fourier_lens=60 mm:90 mm:2",
-        "--depths",
+        "fourier_lens=60 mm:90 mm:x2",
+        "--depth",
         "-10 um, 10 um",
         "-o",
         str(best),
@@ -366,9 +366,9 @@ def test_gradients_move_single_lenslets_where_a_simplex_stalls():
                        for n, c in enumerate((0.01, -0.01, -0.01, 0.01), 1)},
         },
     )  # fmt: skip
-    vary = {f"lenslets.single.{n}.focal_change": "-0.05:0.05:1" for n in (1, 2, 3, 4)}
+    vary = {f"lenslets.single.{n}.focal_change": "-0.05:0.05:x1" for n in (1, 2, 3, 4)}
     for n in (1, 2, 3, 4):
-        vary |= {f"lenslets.single.{n}.offset_{axis}": "-200 um:200 um:1" for axis in "yx"}
+        vary |= {f"lenslets.single.{n}.offset_{axis}": "-200 um:200 um:x1" for axis in "yx"}
     goal = Goal("depth", depths=(-24e-6, 24e-6), light=Light(5000), places=2)
     with pytest.warns(SamplingWarning, match="half-way between"):
         found = lg.optimise(start, vary, goal, search="gradient", evaluations=12)

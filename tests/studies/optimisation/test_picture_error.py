@@ -15,7 +15,7 @@ from lumigraph.studies.optimisation import Goal
 from lumigraph.studies.optimisation.tried import DrawnErrors
 
 UM = 1e-6
-VARY = {"main_lens.diameter": "1 mm:8 mm:4"}
+VARY = {"main_lens.diameter": "1 mm:8 mm:x4"}
 
 
 def plain():
@@ -74,7 +74,7 @@ def test_nonsense_is_refused_before_any_camera():
 @pytest.mark.filterwarnings("ignore:half-way between the depths")
 @pytest.mark.long  # 13 s
 def test_gradients_lead_to_a_better_camera_without_lenslets():
-    vary = {"main_lens.diameter": "1 mm:8 mm:1", "main_lens.aberrations.4": "-0.5:0.5:1"}
+    vary = {"main_lens.diameter": "1 mm:8 mm:x1", "main_lens.aberrations.4": "-0.5:0.5:x1"}
     found = lg.optimise(plain(), vary, goal(), search="gradient", evaluations=8)
     assert found.best["picture error"] < 0.99 * found.swept["picture error"]
 
@@ -86,7 +86,7 @@ def test_gradients_lead_to_a_better_camera_with_lenslets():
         lenslets={"pitch": "200 um", "focal_length": "5.2 mm", "count": (9, 9), "magnification": 0.5},
         sensor={"pixel_pitch": "15 um"},
     )  # fmt: skip
-    vary = {"lenslets.magnification": "0.3:0.6:1", "lenslets.focal_length": "5 mm:6 mm:1"}
+    vary = {"lenslets.magnification": "0.3:0.6:x1", "lenslets.focal_length": "5 mm:6 mm:x1"}
     aim = goal(depths=(-3e-3,), scenes=Scenes(70 * UM, 8), light=Light(500))
     found = lg.optimise(start, vary, aim, search="gradient", evaluations=4)
     assert found.best["picture error"] < 0.995 * min(
@@ -99,7 +99,7 @@ def line(tmp_path):
     (tmp_path / "plain.toml").write_text(plain().to_toml())
     return [
         "optimise", str(tmp_path / "plain.toml"), "--vary", "main_lens.diameter=2 mm, 3 mm",
-        "--depths", "-3 mm:3 mm:2 mm", "--photons", "200", "-o", str(tmp_path / "best.toml"),
+        "--depth", "-3 mm:3 mm:2 mm", "--photons", "200", "-o", str(tmp_path / "best.toml"),
     ]  # fmt: skip
 
 

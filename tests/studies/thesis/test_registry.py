@@ -230,7 +230,7 @@ def test_reproduce_ends_with_1_when_a_row_fails(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [(["9.99"], "no experiment '9.99'. Near ones"), (["3.12", "-o", "{file}"], "is a file. Give a folder"),
-     (["3.12", "-o", "{file}/x/y"], "does not exist. Make it first")],
+     (["3.12", "-o", "{file}/x/y"], "is a file, not a folder for y")],
 )  # fmt: skip
 def test_reproduce_refuses_in_one_line(tmp_path, capsys, arguments, message):
     file = tmp_path / "file"

@@ -58,7 +58,7 @@ class MetricCamera:
 
     def __post_init__(self) -> None:
         for name in ("focal_length", "separation", "lenslet_distance", "exit_pupil", "pixel_pitch"):
-            checks.positive(name, getattr(self, name))
+            object.__setattr__(self, name, checks.positive(name, getattr(self, name)))
         for name, counts in _COUNTS.items():
             values = np.asarray(getattr(self, name))
             if values.ndim != 1 or len(values) not in counts:

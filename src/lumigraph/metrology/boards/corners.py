@@ -94,7 +94,7 @@ class Board:
             raise CalibrationError(
                 f"the board has {self.shape[0]} x {self.shape[1]} corners but needs {LEAST} along each side."
             )
-        checks.positive("spacing", self.spacing)
+        object.__setattr__(self, "spacing", checks.positive("spacing", self.spacing))
         if self.pattern not in PATTERNS:
             raise CalibrationError(
                 f"the pattern is {self.pattern!r} but must be one of {', '.join(PATTERNS)}."
@@ -115,7 +115,7 @@ class Board:
             )
         if self.size is None:
             return
-        checks.positive("size", self.size)
+        object.__setattr__(self, "size", checks.positive("size", self.size))
         if self.pattern == "corners":
             raise CalibrationError("a chessboard has neither dots nor markers, whose size was given.")
         most = self.spacing * (math.sqrt(2) if self.pattern == "asymmetric dots" else 1)

@@ -61,7 +61,7 @@ def save_camera(
     *,
     distance: float | None = None,
     f_number: float | None = None,
-    views: int | None = None,
+    directions: int | None = None,
 ) -> tuple[str, ...]:
     """Write a camera for COMPOTE or LFToolbox; returns what the file leaves out, one sentence each.
 
@@ -77,8 +77,8 @@ def save_camera(
         Of COMPOTE's: where distortion is the same [m]; the plane whose image is in the lenslets if left out.
     f_number
         Of COMPOTE's main lens.
-    views
-        Of LFToolbox' light fields, along an axis.
+    directions
+        Views along each axis of LFToolbox' light fields.
 
     Raises
     ------
@@ -88,11 +88,11 @@ def save_camera(
     checks.choice("form", form, FORMATS, FormatError)
     if form == "compote":
         plain, notes = compote.intrinsics_of(camera, calibration, distance=distance, f_number=f_number)
-    elif views is None:
+    elif directions is None:
         raise FormatError(
-            "LFToolbox' matrix belongs to light fields of so many views along an axis. Give views=9."
+            "LFToolbox' matrix belongs to light fields of so many views along an axis. Give directions=9."
         )
     else:
-        plain, notes = lftoolbox.info_of(camera, calibration, views)
+        plain, notes = lftoolbox.info_of(camera, calibration, directions)
     write_bytes(path, json.dumps(plain, indent=1).encode())
     return notes

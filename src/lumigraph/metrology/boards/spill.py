@@ -87,7 +87,7 @@ class Spill:
     edges: tuple[Pair, ...] = ()
 
     def __post_init__(self) -> None:
-        checks.positive("wavelength", self.wavelength)
+        object.__setattr__(self, "wavelength", checks.positive("wavelength", self.wavelength))
         checks.positive("fill", self.fill, "1")
         for value in itertools.chain(*self.edges):
             checks.positive("edges", value, "1")

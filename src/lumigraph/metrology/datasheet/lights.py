@@ -3,10 +3,11 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from os import PathLike
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, upper_floors
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.core.progress import Progress, silent
@@ -62,7 +63,7 @@ def usual_exposures(camera: LensletCamera) -> int:
 
 
 def simulate_charts(
-    camera: LensletCamera,
+    camera: LensletCamera | str | PathLike[str],
     depths: Sequence[float] | None = None,
     *,
     name: str = "camera",
@@ -76,7 +77,7 @@ def simulate_charts(
     Parameters
     ----------
     camera
-        A plenoptic camera 1.0 or 2.0.
+        A plenoptic camera 1.0 or 2.0, its file, or a name of the catalogue.
     depths
         Of the charts from the plane in focus [m]; None for `usual_depths`.
     name
@@ -95,6 +96,7 @@ def simulate_charts(
     GeometryError
         Another kind of camera, or a depth inside the focal length.
     """
+    camera = upper_floors.camera(camera)
     rng = np.random.default_rng(0) if rng is None else rng
     count = (
         usual_exposures(check_camera(camera)) if exposures is None else checks.whole("exposures", exposures)

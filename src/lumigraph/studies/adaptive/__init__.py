@@ -15,3 +15,7 @@ from lumigraph.studies.adaptive.start import ViewSlopes, start
 from lumigraph.studies.adaptive.wavefront import Wavefront, wavefront_map
 
 __all__ = ["MODES", "TERMS", "ViewSlopes", "Wavefront", "estimate", "sense", "start", "wavefront_map"]
+
+
+def __dir__() -> list[str]:
+    return __all__

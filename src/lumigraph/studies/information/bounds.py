@@ -12,11 +12,12 @@ import math
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
-from lumigraph.core import checks, memory
+from lumigraph.core import checks, memory, upper_floors
 from lumigraph.core.progress import Progress
 from lumigraph.core.result import Quantity
 from lumigraph.core.short_repr import brief
@@ -159,7 +160,7 @@ class Bounds:
 
 
 def bounds(
-    instrument: Instrument,
+    instrument: Instrument | str | PathLike[str],
     depths: Sequence[float],
     light: Light | None = None,
     *,
@@ -177,7 +178,7 @@ def bounds(
     Parameters
     ----------
     instrument
-        A camera or microscope of any kind.
+        A camera or microscope of any kind, its file, or a name of the catalogue.
     depths
         From the focused plane [m], positive farther.
     light
@@ -215,6 +216,7 @@ def bounds(
     True
     """
     light = Light() if light is None else light
+    instrument = upper_floors.camera(instrument)
     checks.instance("light", light, Light)
     checks.instance("instrument", instrument, Instrument)
     planes = checked_depths(depths)

@@ -13,11 +13,12 @@ import math
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, upper_floors
 from lumigraph.core.progress import Progress
 from lumigraph.core.result import Quantity
 from lumigraph.core.short_repr import brief
@@ -83,7 +84,7 @@ class ReconstructionError:
 
 
 def reconstruction_error(
-    instrument: Instrument,
+    instrument: Instrument | str | PathLike[str],
     depths: Sequence[float],
     scenes: Scenes,
     light: Light | None = None,
@@ -101,7 +102,7 @@ def reconstruction_error(
     Parameters
     ----------
     instrument
-        A camera or microscope of any kind.
+        A camera or microscope of any kind, its file, or a name of the catalogue.
     depths
         From the focused plane [m], positive farther.
     scenes
@@ -142,6 +143,7 @@ def reconstruction_error(
     True
     """
     light = Light() if light is None else light
+    instrument = upper_floors.camera(instrument)
     checks.instance("light", light, Light)
     checks.instance("scenes", scenes, Scenes)
     checks.instance("instrument", instrument, Instrument)

@@ -60,7 +60,7 @@ class Scenes:
     spectrum: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        checks.positive("pitch of scenes", self.pitch)
+        object.__setattr__(self, "pitch", checks.positive("pitch of scenes", self.pitch))
         checks.positive("contrast of scenes", self.contrast, "1")
         _check_samples(self.samples)
         powers = np.array(self.spectrum, np.float64)
@@ -92,7 +92,7 @@ class Scenes:
         FormatError
             A picture that is no array of numbers from 0 on, has NaN, is dark or even, or has fewer pixels.
         """
-        checks.positive("pitch of scenes", pitch)
+        pitch = checks.positive("pitch of scenes", pitch)
         _check_samples(samples)
         count = rings(samples)
         total, number = np.zeros((samples, samples)), 0

@@ -14,3 +14,7 @@ from lumigraph.studies.optimisation.mask import DepthMask, depth_mask
 from lumigraph.studies.optimisation.optimise import Optimum, optimise
 
 __all__ = ["DepthMask", "Goal", "Optimum", "depth_mask", "optimise"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -134,7 +134,7 @@ def optimise(
     instrument
         A camera, its file, or a name of the catalogue.
     vary
-        By keys of the camera file: "0.3:0.6:4" or "4 mm:6 mm:3" is a range, of which so many values are tried
+        By keys of the camera file: "0.3:0.6:x4" or "4 mm:6 mm:1 mm" is a range, whose values are tried
         first; "100 um, 150 um" a stock.
     goal
         `Goal`, or its text: "depth" (default), "lateral", "brightness", "picture error", "largest light
@@ -182,7 +182,7 @@ def optimise(
     Examples
     --------
     >>> import lumigraph as lg
-    >>> vary = {"fourier_lens": "60 mm:90 mm:2"}
+    >>> vary = {"fourier_lens": "60 mm:90 mm:x2"}
     >>> found = lg.optimise("lfm-fourier", vary, depths=[-1e-5, 1e-5], evaluations=4)
     >>> found.best["depth"] <= found.swept["depth"]
     True

@@ -69,14 +69,14 @@ class Space:
 
     @classmethod
     def of(cls, vary: Mapping[str, str] | Sequence[str]) -> "Space":
-        """Space from texts as `lumigraph sweep --vary` takes them: ranges 'first:last:count', or stocks.
+        """Space from texts as `lumigraph sweep --vary` takes them: ranges, or stocks.
 
         Raises
         ------
         FormatError
             Another text, no range that goes up, nothing to change, a key that stands twice.
 
-        >>> space = Space.of(["lenslets.magnification=0.3:0.5:3", "lenslets.pitch=100 um, 150 um"])
+        >>> space = Space.of(["lenslets.magnification=0.3:0.5:x3", "lenslets.pitch=100 um, 150 um"])
         >>> len(space.combinations()), space.ranges["lenslets.magnification"].at(0.5)
         (6, 0.4)
         """
@@ -151,10 +151,8 @@ def _number(value: Any) -> float:
 
 
 def _range(text: str) -> Range:
-    ends = [NUMBER.fullmatch(part.strip()) for part in text.partition("=")[2].split(":")[:2]]
-    assert ends[0] is not None
-    assert ends[1] is not None
-    low, high = (float(one[1]) for one in ends if one)
+    name, _, words = text.partition("=")
+    (low, high), unit = units.spaced(f"{words.rpartition(':')[0]}:x2", f"--vary {name.strip()}")
     if not low < high:
         raise FormatError(f"--vary {text!r} must go up: its last value must be above its first.")
-    return Range(low, high, ends[0][2])
+    return Range(low, high, unit)

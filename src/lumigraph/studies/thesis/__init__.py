@@ -13,3 +13,7 @@ from lumigraph.studies.thesis.collected import experiments, find
 from lumigraph.studies.thesis.registry import Context, Experiment, ExperimentOutcome, ResultRow, experiment
 
 __all__ = ["Context", "Experiment", "ExperimentOutcome", "ResultRow", "experiment", "experiments", "find"]
+
+
+def __dir__() -> list[str]:
+    return __all__

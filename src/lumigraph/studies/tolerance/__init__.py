@@ -15,3 +15,7 @@ from lumigraph.studies.tolerance.study import Study, study
 from lumigraph.studies.tolerance.trials import ToleranceTrials
 
 __all__ = ["Study", "ToleranceOutcome", "ToleranceTrials", "built", "cameras", "drawn", "measures", "study"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -3,11 +3,13 @@
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from lumigraph import cluster
+from lumigraph.core import upper_floors
 from lumigraph.core.result import Quantity
 from lumigraph.core.short_repr import brief
 from lumigraph.errors import GeometryError
@@ -118,7 +120,7 @@ class Study:
 
 
 def study(
-    camera: LensletCamera,
+    camera: LensletCamera | str | PathLike[str],
     tolerances: Mapping[str, str | Tolerance] | None = None,
     *,
     draws: int = 1000,
@@ -132,7 +134,7 @@ def study(
     Parameters
     ----------
     camera
-        What is meant, a plenoptic camera 1.0 or 2.0.
+        What is meant: a plenoptic camera 1.0 or 2.0, its file, or a name of the catalogue.
     tolerances
         Such as ``{"separation": "±0.05 mm"}``, beside those of the camera file or instead of them; see
         `Tolerance`.
@@ -174,6 +176,7 @@ def study(
     >>> float(round(found["focus shift"].first_order * 1e6, 1))  # the image of 2f moves as the lenslets do
     25.0
     """
+    camera = upper_floors.camera(camera)
     trials = ToleranceTrials.of(camera, tolerances, measure, seed=seed)
     items = trials.items(draws)
     if output is None:
