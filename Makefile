@@ -78,4 +78,4 @@ lock:  ## compile the three locks again (needs uv); nothing is installed
 	$(COMPILE) --extra docs --constraint requirements-dev.lock -o docs/requirements.lock
 
 clean:
-	rm -rf .venv demo reproduce build dist site jupyter_execute docs/gallery docs/api
+	rm -rf .venv demo reproduce build dist site jupyter_execute docs/gallery docs/reference/api

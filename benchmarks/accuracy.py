@@ -4,7 +4,7 @@
 
 Numbers are relative rms errors of raw images, the worst of each place, over the accuracy asked for: up to 1
 the promise is kept in the middle and outside the array, up to 2 within a lenslet of its border. Rows are kept
-in a file as they come; a run that was stopped goes on. `--write` puts the table into docs/operator.md.
+in a file as they come; a run that was stopped goes on. `--write` puts the table into docs/validation/operator.md.
 """
 
 import argparse
@@ -29,7 +29,7 @@ from lumigraph.units import mm, um
 ACCURACIES = (1e-2, 1e-3, 1e-4)
 DEPTHS = (-3 * mm, 0.0, 3 * mm)
 PLACES = ("middle", "border", "outside")
-DOCUMENT = Path(__file__).parents[1] / "docs" / "operator.md"
+DOCUMENT = Path(__file__).parents[1] / "docs" / "validation" / "operator.md"
 MARKS = "<!-- accuracy: python -m benchmarks.accuracy --write -->", "<!-- end of accuracy -->"
 SQUARE = references.Fineness(72, 4, 900, 64)
 """Converged to 1e-6 and better."""
@@ -300,7 +300,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=EVERY, default=EVERY)
     parser.add_argument("--rows", type=Path, default=Path(tempfile.gettempdir()) / "lumigraph-accuracy.jsonl")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="stop after these")
-    parser.add_argument("--write", action="store_true", help="the table into docs/operator.md")
+    parser.add_argument("--write", action="store_true", help="the table into docs/validation/operator.md")
     options = parser.parse_args()
     known = run(options.only, options.rows, until=time.monotonic() + 60 * options.minutes)
     print(table(known), *missed(known), sep="\n")

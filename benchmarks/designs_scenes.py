@@ -114,7 +114,7 @@ CAMERAS = {
     "a camera 2.0, as given": (0.5, "150 um"), "a camera 2.0, best of the sweep for points": (0.6, "200 um"),
     "a camera 2.0, for points": (0.47, "200 um"),
 }  # fmt: skip
-"""Magnification and pitch of lenslets of the cameras of docs/optimise.md, ±6 mm."""
+"""Magnification and pitch of lenslets of the cameras of docs/validation/optimise.md, ±6 mm."""
 
 
 def search(name: str) -> None:

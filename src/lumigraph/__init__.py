@@ -11,7 +11,7 @@ The everyday names, listed in `__init__.pyi`; each is imported when it is first 
 
 from lumigraph.core import upper_floors
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 TYPE_CHECKING = False  # `typing` takes ten times as long as all of this
 if TYPE_CHECKING:

@@ -80,7 +80,7 @@ def test_help_is_quick_because_nothing_slow_is_imported():
 
 
 def test_the_version_is_printed(lumigraph):
-    assert lumigraph("--version").out.strip() == "0.1.0"
+    assert lumigraph("--version").out.strip() == "0.2.0"
 
 
 def test_design_prints_a_table_and_json(lumigraph, bench):

@@ -1,21 +1,23 @@
-"""docs/deconvolution.md: its programs run, its commands exist."""
+"""Pages about deconvolution: its programs run, its commands exist."""
 
 import re
 from pathlib import Path
 
 import numpy as np
 
-PAGE = Path(__file__).parents[2] / "docs" / "deconvolution.md"
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = ("how-to/deconvolution.md", "explanations/deconvolution.md", "how-to/several-raw-images.md")
 
 
 def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```", PAGE.read_text("utf-8"), re.M | re.S)
+    text = "\n".join((DOCS / page).read_text("utf-8") for page in PAGES)
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.M | re.S)
 
 
 def test_its_programs_run_from_top_to_bottom():
     names = {}
     for code in blocks("python"):
-        exec(compile(code, str(PAGE), "exec"), names)
+        exec(compile(code, PAGES[0], "exec"), names)
     scene = names["edge"].parts[0].intensity
     inner = (slice(4, -4), slice(4, -4))
     for name in ("picture", "even"):

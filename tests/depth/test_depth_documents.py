@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_the_page_about_depth_runs():
-    (block,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/depth.md").read_text(), re.S)
+    (block,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/how-to/depth.md").read_text(), re.S)
     names = {}
     exec(block, names)
     assert np.median(names["found"].values) == pytest.approx(0.4, abs=0.005)

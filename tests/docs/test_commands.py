@@ -14,7 +14,7 @@ _SPEC.loader.exec_module(pages)
 GALLERY = sorted((pages.ROOT / "examples/gallery").glob("plot_*.py"))
 
 
-EVERY_PAGE = ["README.md", *sorted(str(p.relative_to(pages.ROOT)) for p in pages.ROOT.glob("docs/*.md"))]
+EVERY_PAGE = ["README.md", *sorted(str(p.relative_to(pages.ROOT)) for p in pages.ROOT.glob("docs/**/*.md"))]
 
 
 def parsed(command):
@@ -61,6 +61,29 @@ def test_a_page_of_the_gallery_has_a_picture_and_something_to_play_with(script):
     assert commands or "lg.view_inline(" in text
     for command in commands:
         parsed(command)
+
+
+def test_a_tutorial_has_two_pictures_or_more():
+    for page in pages.PAGES[1:]:
+        text = (pages.ROOT / page).read_text("utf-8")
+        names = re.findall(r"^```\{image\} (\S+)", text, re.M)
+        assert len(names) >= 2, page
+        for name in names:
+            assert ((pages.ROOT / page).parent / name).is_file(), name
+
+
+GUIDES = [
+    path
+    for kind in ("tutorials", "how-to", "explanations")
+    for path in sorted(pages.ROOT.glob(f"docs/{kind}/*.md"))
+]
+
+
+@pytest.mark.parametrize("path", [*GUIDES, pages.ROOT / "README.md"], ids=lambda path: path.stem)
+def test_a_page_has_1200_words_or_fewer(path):
+    """What is measured stands in docs/validation; README has 800."""
+    most = 800 if path.name == "README.md" else 1200
+    assert len(path.read_text("utf-8").split()) <= most
 
 
 def test_the_gallery_has_25_pictures_or_more():

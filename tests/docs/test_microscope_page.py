@@ -1,4 +1,4 @@
-"""The page about microscopes and its example run as a reader would run them."""
+"""The pages about microscopes and their example run as a reader would run them."""
 
 import re
 import runpy
@@ -10,14 +10,19 @@ import pytest
 import lumigraph as lg
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "microscope.md").read_text(encoding="utf-8")
+PAGES = ("how-to/microscope", "explanations/derivatives", "how-to/adaptive", "how-to/wavefront-sensor")
+
+
+def text(name):
+    return (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.long  # 20 s of deconvolution
 def test_the_page_finds_its_beads():
     names: dict = {}
-    for code in re.findall(r"```python\n(.*?)```", PAGE, re.S):
-        exec(compile(code, "docs/microscope.md", "exec"), names)
+    for name in PAGES:
+        for code in re.findall(r"```python\n(.*?)```", text(name), re.S):
+            exec(compile(code, name, "exec"), names)
     volume = names["volume"]
     for z, y, x in ((1, 10, 8), (3, 13, 16)):
         assert volume[z, y, x] == volume[z].max()
@@ -25,7 +30,8 @@ def test_the_page_finds_its_beads():
 
 
 def test_the_microscope_file_of_the_page_is_read(tmp_path):
-    whole, part = re.findall(r"```toml\n(.*?)```", PAGE, re.S)
+    (whole,) = re.findall(r"```toml\n(.*?)```", text(PAGES[0]), re.S)
+    (part,) = re.findall(r"```toml\n(.*?)```", text("explanations/microscope"), re.S)
     (tmp_path / "scope.toml").write_text(whole)
     assert lg.load_camera(tmp_path / "scope.toml").magnification == pytest.approx(60.0)
     regular = lg.LightFieldMicroscope.from_catalogue("lfm-fourier")

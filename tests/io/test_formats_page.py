@@ -1,4 +1,4 @@
-"""docs/formats.md and examples/files.py say what is true."""
+"""docs/reference/formats.md, docs/how-to/camera-files.md and examples/files.py say what is true."""
 
 import re
 import runpy
@@ -10,7 +10,8 @@ import lumigraph as lg
 import lumigraph.io as io
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "formats.md").read_text()
+PAGE = (ROOT / "docs" / "reference" / "formats.md").read_text()
+PROGRAM = (ROOT / "docs" / "how-to" / "camera-files.md").read_text()
 
 
 def test_the_page_lists_the_table_of_formats():
@@ -25,8 +26,8 @@ def test_the_page_lists_the_table_of_formats():
 
 def test_the_program_of_the_page_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (code,) = re.findall(r"^```python\n(.*?)^```", PAGE, re.M | re.S)
-    exec(compile(code, "docs/formats.md", "exec"), {})
+    (code,) = re.findall(r"^```python\n(.*?)^```", PROGRAM, re.M | re.S)
+    exec(compile(code, "docs/how-to/camera-files.md", "exec"), {})
     assert "5 pages of 20 x 30" in capsys.readouterr().out
 
 

@@ -1,4 +1,4 @@
-"""The table of docs/operator.md: running part of it keeps the rest."""
+"""The table of docs/validation/operator.md: running part of it keeps the rest."""
 
 from benchmarks import accuracy
 from benchmarks.accuracy import DEPTHS, DOCUMENT, MARKS, Cell, merged, table

@@ -333,7 +333,7 @@ def test_the_address_is_printed_on_one_line(tmp_path, capsys, monkeypatch):
 
 
 def test_the_program_in_the_docs_runs(tmp_path, monkeypatch, capsys):
-    text = (Path(__file__).parents[2] / "docs" / "viewer.md").read_text()
+    text = (Path(__file__).parents[2] / "docs" / "how-to" / "viewer.md").read_text()
     monkeypatch.chdir(tmp_path)
     for code in re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
         exec(code, {})

@@ -17,7 +17,7 @@ LEVELS = 1.0  # of 255: rounding is 0.5; another interpolation or border differs
 
 
 def shown(picture, white=255.0, ev=0.0, gamma=1.0):
-    """A picture as bytes from 0 to 255, by the formula that docs/viewer.md gives."""
+    """A picture as bytes from 0 to 255, by the formula that docs/reference/viewer-numbers.md gives."""
     levels = np.clip(2.0**ev * np.asarray(picture, float) / white, 0, 1) ** (1 / gamma) * 255
     return levels if levels.ndim == 3 else np.repeat(levels[..., None], 3, -1)
 

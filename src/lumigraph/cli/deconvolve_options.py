@@ -97,7 +97,7 @@ class ObjectOptions:
         Samples per lenslet, of the object.
     """
 
-    depth: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True, negative="")] = None
+    depth: Annotated[tuple[str, ...] | None, Parameter(allow_leading_hyphen=True, negative="")] = None
     samples: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
 
     def depths(self) -> tuple[float, ...] | None:

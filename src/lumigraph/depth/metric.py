@@ -74,7 +74,7 @@ def metric(
 
     References
     ----------
-    Thesis eq. 4.7, 5.5 and 5.10; docs/conventions.md.
+    Thesis eq. 4.7, 5.5 and 5.10; docs/reference/conventions.md.
 
     Examples
     --------

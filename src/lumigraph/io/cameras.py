@@ -1,6 +1,6 @@
 """A grid of cameras as a light field: which view is which.
 
-In a camera farther right near things appear farther left. In a `LightField` (docs/conventions.md)
+In a camera farther right near things appear farther left. In a `LightField` (docs/reference/conventions.md)
 near things (α' < 1) move with u, x = α'x' + u(1 - α'), as they do behind a lens, whose pictures are turned.
 So the views stand in the opposite order of the cameras: u ascends from the rightmost camera to the leftmost,
 v from the lowest to the highest. Disparities of stereo, positive for near, are then slopes ds/du.
