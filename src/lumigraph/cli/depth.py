@@ -205,8 +205,8 @@ def depth(
     source
         Views (.zarr, .h5, a folder), or a raw image.
     output
-        Map (.pfm, .tiff, .zarr), its picture, near to far as white to black (.png), or points in space
-        (.ply). With a camera file (a microscope's too) or --focal-length depths from the focused plane [m],
+        Map (.pfm, .tiff, .zarr), its picture, near to far as white to black, as fine as 'lumigraph refocus'
+        makes pictures of the views (.png), or points in space (.ply). With a camera file (a microscope's too) or --focal-length depths from the focused plane [m],
         positive farther from the objective;
         else disparities [px per view], positive nearer, refocus factors, or patches [px].
     confidence
@@ -308,6 +308,7 @@ def _save(made: _Measured, output: Path, points: tuple[float | None, float]) -> 
     from lumigraph import depth as verbs
     from lumigraph import io
     from lumigraph.core.arrays import to_numpy
+    from lumigraph.core.lightfield import LightField
 
     found, name = made.depth, output.name.lower()
     if name.endswith(".ply") and points[0] is not None:
@@ -318,11 +319,8 @@ def _save(made: _Measured, output: Path, points: tuple[float | None, float]) -> 
         )
         io.save(cloud, output)
     elif name.endswith(".png"):
-        values = to_numpy(found.values).astype(float)
-        low, high = np.nanquantile(values, (0.01, 0.99)) if np.isfinite(values).any() else (0.0, 1.0)
-        part = np.nan_to_num((values - low) / ((high - low) or 1))
-        nearer_is_more = found.quantity in ("disparity", "patch")
-        io.save(np.clip(part if nearer_is_more else 1 - part, 0, 1), output, white=1.0)
+        views = made.grounds if isinstance(made.grounds, LightField) else None
+        io.save(verbs.drawn(found, views), output, white=1.0)
     else:
         io.save(found, output)
 

@@ -10,7 +10,7 @@ from lumigraph.cli import files
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import Output, length
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions
-from lumigraph.cli.refocus import MOST_SHOWN, range_of
+from lumigraph.cli.refocus import MOST_SHOWN, range_of, told_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.progress import Progress
 from lumigraph.core.result import Figure, Quantity, Result
@@ -331,5 +331,6 @@ def _from_views(views: "LightField", look: ViewOptions, output: Path, shown: Pro
     io.save(made.picture, output)
     rows, columns = made.picture.shape[:2]
     ends = list(extra.quantiles(0.01, 0.99))
-    text = f"{rows} x {columns} px, refocus factors from {ends[0]:.4g} to {ends[1]:.4g}"
+    told = told_of(rendering.detail(views))
+    text = f"{rows} x {columns} px{told}, refocus factors from {ends[0]:.4g} to {ends[1]:.4g}"
     return _RenderedPicture([made.picture], text, (Quantity("alpha", ends),), extra)

@@ -1,0 +1,117 @@
+"""Steps of cameras 1.0 and of views."""
+
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from lumigraph import io
+from lumigraph.core.arrays import to_numpy
+from lumigraph.core.depth_map import DepthMap
+from lumigraph.core.lightfield import LightField
+from lumigraph.core.prepared import PreparedImage
+from lumigraph.core.progress import Progress
+from lumigraph.depth import alpha_of, disparity_of, drawn, epi, measurable
+from lumigraph.errors import FormatError
+from lumigraph.processing.shown import FRAMES, save_film, save_picture
+from lumigraph.processing.steps import Step
+from lumigraph.rendering import AllInFocus, all_in_focus, decode, detail, focus_range, refocus_stack
+from lumigraph.viewer.exhibit import Exhibit, grey_or_colour
+
+VIEWS = "views.zarr"
+_PLANES = 33  # refocus factors that are tried where views are too small for lines
+_SPARE = 0.5  # of the depths that occur, that a film goes beyond them on each side
+_ENDS = 0.02, 0.98
+
+
+class FromViews:
+    """Depth, pictures and a film of a light field, each computed once.
+
+    Parameters
+    ----------
+    views
+        Light field; or the raw image that it is decoded from.
+    exhibit
+        Gives the page's contents.
+    """
+
+    def __init__(self, source: LightField | PreparedImage) -> None:
+        self._source = source
+
+    @cached_property
+    def views(self) -> LightField:
+        """The light field."""
+        if isinstance(self._source, LightField):
+            return self._source
+        if self._source.calibration is None:
+            raise FormatError("the raw image was not prepared with a calibration. Use lumigraph.prepare.")
+        return decode(self._source, self._source.calibration)
+
+    @cached_property
+    def shown(self) -> LightField:
+        """The light field, without a colour axis of one channel."""
+        return grey_or_colour(self.views)
+
+    @cached_property
+    def depth(self) -> DepthMap:
+        """Refocus factors of the middle view."""
+        if measurable(self.shown):
+            return alpha_of(epi(self.shown), self.shown)
+        alphas = np.linspace(*focus_range(self.shown), _PLANES)
+        found = all_in_focus(self.shown, alphas, oversample=1)
+        return DepthMap(to_numpy(found.alpha), to_numpy(found.confidence), "alpha")
+
+    @cached_property
+    def sharp(self) -> AllInFocus:
+        """Picture that is sharp at every depth."""
+        return all_in_focus(self.shown, depth=to_numpy(self.depth.values))
+
+    def alphas(self) -> np.ndarray:
+        """Refocus factors of the film, from near to far, somewhat beyond what is there."""
+        low, high = np.nanquantile(to_numpy(self.depth.values), _ENDS)
+        least, most = focus_range(self.shown)
+        spare = max(_SPARE * (high - low), 0.1 * (most - least))
+        return np.linspace(max(low - spare, min(least, low)), min(high + spare, max(most, high)), FRAMES)
+
+    def steps(self, source: str, *, decoded: bool) -> list[Step]:
+        """What is written; `decoded`: the views come from a raw image."""
+
+        def write_views(folder: Path, progress: Progress) -> None:
+            io.save(self.views, folder / VIEWS)
+
+        def write_depth(folder: Path, progress: Progress) -> None:
+            io.save(disparity_of(self.depth, self.shown), folder / "depth.tiff")
+            io.save(drawn(disparity_of(self.depth, self.shown), self.shown), folder / "depth.png", white=1.0)
+
+        def write_picture(folder: Path, progress: Progress) -> None:
+            save_picture(self.sharp.picture, folder / "all-in-focus.png")
+
+        def write_film(folder: Path, progress: Progress) -> None:
+            save_film(refocus_stack(self.shown, self.alphas(), progress=progress), folder / "refocus.gif")
+
+        steps = [Step("views", (VIEWS,), write_views, source, 2.0)] if decoded else []
+        return [
+            *steps,
+            Step("depth", ("depth.tiff", "depth.png"), write_depth, source, 3.0),
+            Step("all-in-focus", ("all-in-focus.png",), write_picture, source, 2.0),
+            Step("film", ("refocus.gif",), write_film, source, 4.0),
+        ]
+
+    def about(self) -> list[str]:
+        """Notes on the pictures."""
+        nv, nu, nt, ns = self.shown.data.shape[:4]
+        times, map_ = detail(self.shown), to_numpy(self.depth.values)
+        low, high = np.nanquantile(map_, _ENDS)
+        return [
+            f"{nv} x {nu} views of {nt} x {ns} px; pictures have {times} samples per lenslet, "
+            f"{(nt - 1) * times + 1} x {(ns - 1) * times + 1} px",
+            f"what is there is sharp at refocus factors from {low:.4g} to {high:.4g}",
+            "depth.tiff holds disparities [lenslets per view], positive nearer than the focused plane",
+        ]
+
+
+def exhibit_of(name: str, made: FromViews) -> Exhibit:
+    """Page of views that were given."""
+    from lumigraph.viewer.opening import of_views
+
+    return of_views(name, made.views)
