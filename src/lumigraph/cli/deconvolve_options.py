@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from lumigraph.cli.options import above_zero, length, region
+from lumigraph.cli.options import above_zero, length, region, section
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 MOST_DEPTHS = 1000
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Raw image"))
 @dataclass(frozen=True)
 class RawImageOptions:
     """Raw image and its corrections.
@@ -85,7 +85,7 @@ class RawImageOptions:
         return [("" if len(found) == 1 else f"-page-{k:0{digits}}", raw) for k, raw in found.items()]
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Object"))
 @dataclass(frozen=True)
 class ObjectOptions:
     """Sampling of the object.
@@ -109,7 +109,7 @@ class ObjectOptions:
         return None if self.z is None else depths("--z", self.z)
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Method"))
 @dataclass(frozen=True)
 class MethodOptions:
     """Method of the deconvolution.

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, above_zero, length
+from lumigraph.cli.options import Output, above_zero, length, section
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions
 from lumigraph.cli.refocus import range_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions, enlarged
@@ -33,7 +33,7 @@ _MOST_PLANES = 101
 _OF_RAW = ("dense", "correlation")
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Search"))
 @dataclass(frozen=True)
 class SearchOptions:
     """Method of measuring depth.
@@ -146,7 +146,7 @@ class _Measured:
     notes: tuple[str, ...] = ()
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Lengths"))
 @dataclass(frozen=True)
 class LengthOptions:
     """Lengths that convert a map to metres, if there is no camera file.
@@ -206,9 +206,9 @@ def depth(
         Views (.zarr, .h5, a folder), or a raw image.
     output
         Map (.pfm, .tiff, .zarr), its picture, near to far as white to black, as fine as 'lumigraph refocus'
-        makes pictures of the views (.png), or points in space (.ply). With a camera file (a microscope's too) or --focal-length depths from the focused plane [m],
-        positive farther from the objective;
-        else disparities [px per view], positive nearer, refocus factors, or patches [px].
+        makes pictures of the views (.png), or points in space (.ply). With a camera file (a microscope's too)
+        or --focal-length depths from the focused plane [m], positive farther from the objective; else
+        disparities [px per view], positive nearer, refocus factors, or patches [px].
     confidence
         File for the confidence of each place, from 0 to 1.
     lowest

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, length
+from lumigraph.cli.options import Output, length, section
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions, notes_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions, enlarged
 from lumigraph.core.progress import Progress
@@ -29,7 +29,7 @@ MOST_SHOWN = 24
 """Pictures in a report."""
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Focus"))
 @dataclass(frozen=True)
 class FocusOptions:
     """Focus: α' = F/F', below 1 nearer than the focused plane, 1 as recorded, above 1 farther.
@@ -80,7 +80,7 @@ def _check_alpha(alpha: float) -> None:
         raise FormatError(f"--alpha is {alpha:g} but must be a finite number above 0.")
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Picture"))
 @dataclass(frozen=True)
 class PictureOptions:
     """Method of making pictures.
@@ -182,7 +182,8 @@ def refocus(
     shape, samples = images[0].shape[:2], quality.samples(source)
     values = (
         Quantity("alphas", alphas), Quantity("shape", shape, "px"), Quantity("method", quality.method),
-        Quantity("samples_per_lenslet", samples), Quantity("aperture", quality.aperture), Quantity("aperture_shape", quality.shape),
+        Quantity("samples_per_lenslet", samples), Quantity("aperture", quality.aperture),
+        Quantity("aperture_shape", quality.shape),
     )  # fmt: skip
     return Result(
         "Refocus", "Pictures refocused; α' above 1 is farther.", images,

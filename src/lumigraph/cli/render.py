@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, length
+from lumigraph.cli.options import Output, length, section
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions
 from lumigraph.cli.refocus import MOST_SHOWN, range_of, told_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions
@@ -29,7 +29,7 @@ _MOST_FINER = 8
 _MOST_FRAMES = 1000
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Raw images of cameras 2.0"))
 @dataclass(frozen=True)
 class TileOptions:
     """Raw images of a camera 2.0: how large the piece of each micro-image is, and how pieces are joined.
@@ -135,7 +135,7 @@ class TileOptions:
         return sharp_kinds(calibration, () if camera is None else camera.patches_on_raw(), origin.calibration)
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Views of cameras 1.0"))
 @dataclass(frozen=True)
 class ViewOptions:
     """Views of a camera 1.0: which picture is made of them.

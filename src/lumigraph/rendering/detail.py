@@ -18,9 +18,10 @@ def detail(views: LightField) -> int:
     Examples
     --------
     >>> from lumigraph.core.grid import Grid
-    >>> small, large = (np.zeros((3, 3, n, n)) for n in (25, 300))
-    >>> [detail(LightField(x, Grid.square(3, 1.0), Grid.square(x.shape[2], 1.0), 1.0)) for x in (small, large)]
-    [8, 1]
+    >>> def views(n):
+    ...     return LightField(np.zeros((3, 3, n, n)), Grid.square(3, 1.0), Grid.square(n, 1.0), 1.0)
+    >>> detail(views(25)), detail(views(300))
+    (8, 1)
     """
     times = 1
     while times < _MOST and max(views.lenslets.shape) * times < _FEWEST_PIXELS:

@@ -52,8 +52,8 @@ def refocus(
         Samples per lenslet: views seen from different places fall between each other's lenslets, so a finer
         picture holds more detail where the plane is not that of the lenslets. The first and last samples
         stay on the first and last lenslet: ((nt - 1) k + 1, (ns - 1) k + 1). If left out, a power of two, at
-        most 8, that gives the picture 200 pixels along its longer side (`lumigraph.rendering.detail`); 1 gives
-        one sample per lenslet.
+        most 8, that gives the picture 200 pixels along its longer side (`lumigraph.rendering.detail`); 1
+        gives one sample per lenslet.
 
     Raises
     ------
