@@ -1,5 +1,6 @@
 """Steps of cameras 1.0 and of views."""
 
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -16,12 +17,13 @@ from lumigraph.errors import FormatError
 from lumigraph.processing.shown import FRAMES, save_film, save_picture
 from lumigraph.processing.steps import Step
 from lumigraph.rendering import AllInFocus, all_in_focus, decode, detail, focus_range, refocus_stack
-from lumigraph.viewer.exhibit import Exhibit, grey_or_colour
+from lumigraph.viewer.exhibit import Exhibit, comfortable, grey_or_colour
 
 VIEWS = "views.zarr"
 _PLANES = 33  # refocus factors that are tried where views are too small for lines
 _SPARE = 0.5  # of the depths that occur, that a film goes beyond them on each side
 _ENDS = 0.02, 0.98
+_LEAST = 0.02  # refocus factor
 
 
 class FromViews:
@@ -29,10 +31,8 @@ class FromViews:
 
     Parameters
     ----------
-    views
+    source
         Light field; or the raw image that it is decoded from.
-    exhibit
-        Gives the page's contents.
     """
 
     def __init__(self, source: LightField | PreparedImage) -> None:
@@ -48,18 +48,29 @@ class FromViews:
         return decode(self._source, self._source.calibration)
 
     @cached_property
+    def _comfortable(self) -> tuple[LightField, bool]:
+        return comfortable(grey_or_colour(self.views))
+
+    @property
     def shown(self) -> LightField:
-        """The light field, without a colour axis of one channel."""
-        return grey_or_colour(self.views)
+        """The light field as the viewer shows it: its refocus factors are above 0."""
+        return self._comfortable[0]
 
     @cached_property
     def depth(self) -> DepthMap:
-        """Refocus factors of the middle view."""
+        """Refocus factors of the middle view of `shown`; NaN where a lens could not focus."""
         if measurable(self.shown):
-            return alpha_of(epi(self.shown), self.shown)
+            found = alpha_of(epi(self.shown), self.shown)
+            factors = to_numpy(found.values).astype(float)
+            return replace(found, values=np.where(factors > _LEAST, factors, np.nan))
         alphas = np.linspace(*focus_range(self.shown), _PLANES)
-        found = all_in_focus(self.shown, alphas, oversample=1)
-        return DepthMap(to_numpy(found.alpha), to_numpy(found.confidence), "alpha")
+        made = all_in_focus(self.shown, alphas, oversample=1)
+        return DepthMap(to_numpy(made.alpha), to_numpy(made.confidence), "alpha")
+
+    @cached_property
+    def disparity(self) -> DepthMap:
+        """Disparities of the middle view [lenslets per view]."""
+        return disparity_of(self.depth, self.shown)
 
     @cached_property
     def sharp(self) -> AllInFocus:
@@ -80,8 +91,8 @@ class FromViews:
             io.save(self.views, folder / VIEWS)
 
         def write_depth(folder: Path, progress: Progress) -> None:
-            io.save(disparity_of(self.depth, self.shown), folder / "depth.tiff")
-            io.save(drawn(disparity_of(self.depth, self.shown), self.shown), folder / "depth.png", white=1.0)
+            io.save(self.disparity, folder / "depth.tiff")
+            io.save(drawn(self.disparity, self.shown), folder / "depth.png", white=1.0)
 
         def write_picture(folder: Path, progress: Progress) -> None:
             save_picture(self.sharp.picture, folder / "all-in-focus.png")
@@ -100,12 +111,17 @@ class FromViews:
     def about(self) -> list[str]:
         """Notes on the pictures."""
         nv, nu, nt, ns = self.shown.data.shape[:4]
-        times, map_ = detail(self.shown), to_numpy(self.depth.values)
-        low, high = np.nanquantile(map_, _ENDS)
+        times, relative = detail(self.shown), self._comfortable[1]
+        low, high = np.nanquantile(to_numpy((self.disparity if relative else self.depth).values), _ENDS)
+        about = (
+            f"disparities go from {low:.3g} to {high:.3g} px per view"
+            if relative
+            else f"what is there is sharp at refocus factors from {low:.4g} to {high:.4g}"
+        )
         return [
             f"{nv} x {nu} views of {nt} x {ns} px; pictures have {times} samples per lenslet, "
             f"{(nt - 1) * times + 1} x {(ns - 1) * times + 1} px",
-            f"what is there is sharp at refocus factors from {low:.4g} to {high:.4g}",
+            about,
             "depth.tiff holds disparities [lenslets per view], positive nearer than the focused plane",
         ]
 
