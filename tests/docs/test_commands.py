@@ -14,7 +14,7 @@ _SPEC.loader.exec_module(pages)
 GALLERY = sorted((pages.ROOT / "examples/gallery").glob("plot_*.py"))
 
 
-EVERY_PAGE = ["README.md", *sorted(str(p.relative_to(pages.ROOT)) for p in pages.ROOT.glob("docs/*.md"))]
+EVERY_PAGE = ["README.md", *sorted(str(p.relative_to(pages.ROOT)) for p in pages.ROOT.glob("docs/**/*.md"))]
 
 
 def parsed(command):

@@ -20,10 +20,10 @@ from lumigraph.processing.notes import mattering, page
 from lumigraph.processing.patches import FromPatches
 from lumigraph.processing.recognise import Guess, Kind, recognise
 from lumigraph.processing.steps import RECORD, Step, Steps
-from lumigraph.processing.views import FromViews, exhibit_of
+from lumigraph.processing.views import FromViews
 from lumigraph.processing.volume import VOLUME, FromVolume
 from lumigraph.viewer import Exhibit, Origin, export
-from lumigraph.viewer.opening import of_raw, of_volume
+from lumigraph.viewer.opening import of_raw, of_views, of_volume
 
 CALIBRATION, NOTES, PAGE = "calibration.toml", "notes.md", "page.html"
 
@@ -192,7 +192,7 @@ def _of_views(given: Inputs) -> _Plan:
     guess = Guess("kind", "views", f"{given.name} holds a light field")
     return _Plan(
         "views", (guess,), made.steps(given.fingerprint, decoded=False),
-        lambda: exhibit_of(given.name, made), made.about,
+        lambda: replace(of_views(given.name, made.views), depth=made.depth), made.about,
     )  # fmt: skip
 
 
@@ -213,7 +213,7 @@ def _of_lenslets(
     def exhibit() -> Exhibit:
         origin = Origin(given.maker, camera=camera)
         if not isinstance(made, FromPatches):
-            return of_raw(given.name, ready, place, None, origin)
+            return replace(of_raw(given.name, ready, place, None, origin), depth=made.depth)
         page = of_raw(given.name, ready, place, sum(made.ends) / 2, origin)
         return replace(page, depth=made.map)  # measured once
 

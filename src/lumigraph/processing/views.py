@@ -17,7 +17,7 @@ from lumigraph.errors import FormatError
 from lumigraph.processing.shown import FRAMES, save_film, save_picture
 from lumigraph.processing.steps import Step
 from lumigraph.rendering import AllInFocus, all_in_focus, decode, detail, focus_range, refocus_stack
-from lumigraph.viewer.exhibit import Exhibit, comfortable, grey_or_colour
+from lumigraph.viewer.exhibit import comfortable, grey_or_colour
 
 VIEWS = "views.zarr"
 _PLANES = 33  # refocus factors that are tried where views are too small for lines
@@ -124,10 +124,3 @@ class FromViews:
             about,
             "depth.tiff holds disparities [lenslets per view], positive nearer than the focused plane",
         ]
-
-
-def exhibit_of(name: str, made: FromViews) -> Exhibit:
-    """Page of views that were given."""
-    from lumigraph.viewer.opening import of_views
-
-    return of_views(name, made.views)

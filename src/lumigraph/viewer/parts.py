@@ -170,8 +170,9 @@ class Parts:
 
 
 def _sharp(views: LightField, depth: Any) -> np.ndarray:
-    """Every place focused on what is there, by its refocus factor."""
-    factors = np.where(_trusted(depth) > 0, to_numpy(depth.values), np.nan)
+    """Every place focused on what is there, by its refocus factor; no lens has one of 0 or less."""
+    known = (_trusted(depth) > 0) & (to_numpy(depth.values) > 0)
+    factors = np.where(known, to_numpy(depth.values), np.nan)
     factors = factors if np.isfinite(factors).any() else np.ones(factors.shape)
     return to_numpy(all_in_focus(grey_or_colour(views), depth=factors, oversample=1).picture)
 
