@@ -34,7 +34,7 @@ demo: $(READY)  ## design, simulate, calibrate, decode, refocus: demo/report.htm
 	$(BIN)/lumigraph demo
 
 test: $(TOOLS)  ## the whole test suite and the doctests
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto -m "not long"
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile -m "not long"
 
 lint: $(TOOLS)  ## format, rules, types, import floors
 	$(BIN)/ruff format --check .

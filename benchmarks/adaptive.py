@@ -41,7 +41,7 @@ EXPOSURE = Exposure(background=1.0, gain=1.0)
 def timed(work: Callable) -> tuple:
     """Result and seconds by the clock, with nothing on disk."""
     with tempfile.TemporaryDirectory() as folder:
-        os.environ["lumigraphCACHE"] = folder
+        os.environ["LUMIGRAPH_CACHE"] = folder
         began = time.perf_counter()
         return work(), time.perf_counter() - began
 

@@ -42,15 +42,15 @@ CASES = ((0.0, 100.0, 0.0), (0.3, 100.0, 0.0), (0.5, 100.0, 3e-3), (1.0, 100.0, 
 
 def spent(work: Callable) -> tuple:
     """Result and CPU seconds, with nothing kept from before."""
-    before = os.environ.get("lumigraphCACHE")
+    before = os.environ.get("LUMIGRAPH_CACHE")
     with tempfile.TemporaryDirectory() as folder:
-        os.environ["lumigraphCACHE"] = folder
+        os.environ["LUMIGRAPH_CACHE"] = folder
         SHARED.empty()
         began = time.process_time()
         found = work(), time.process_time() - began
-    os.environ.pop("lumigraphCACHE")
+    os.environ.pop("LUMIGRAPH_CACHE")
     if before is not None:
-        os.environ["lumigraphCACHE"] = before
+        os.environ["LUMIGRAPH_CACHE"] = before
     return found
 
 

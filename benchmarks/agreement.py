@@ -1,6 +1,6 @@
 """Real raw images and views by Python, by the command line and by the viewer's routes: the same pictures?
 
-Each set (lumigraphDATA) is decoded, or rendered, and its depth measured three times: by Python, by the
+Each set (LUMIGRAPH_DATA) is decoded, or rendered, and its depth measured three times: by Python, by the
 verbs (read from their files), and as the viewer's server sends it to the page. Pictures are compared in grey
 levels, 1/255 of what the viewer shows as white; maps in 1/255 of what they span but for their outermost 1 %.
 
@@ -24,7 +24,7 @@ from lumigraph import preparation, viewer
 from lumigraph.cli import main as lumigraph
 from lumigraph.rendering import detail
 
-DATA = Path(os.environ.get("lumigraphDATA") or Path(__file__).parents[2] / "shared" / "data")
+DATA = Path(os.environ.get("LUMIGRAPH_DATA") or Path(__file__).parents[2] / "shared" / "data")
 PLANES = 5
 """Refocused pictures that are compared, through the range of the viewer's slider."""
 

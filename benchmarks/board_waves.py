@@ -2,7 +2,7 @@
 
 ``python -m benchmarks.board_waves views | focused | kinds [--runs 3] [--first 0] [--pictures 20] [--each 6]
 [--workers 1] [--minutes 60] [--keep FOLDER]``: each run simulates a white image and boards at the poses of
-`lg.metric.plan` through wave optics, exposes them with the sensor's noise, finds corners on the files, and
+`lg.metrology.plan` through wave optics, exposes them with the sensor's noise, finds corners on the files, and
 runs ``lumigraph board`` on their table, told a focal length that is off by 2 % and the lenslets' pitch off by
 1e-4 (one standard deviation). Cameras differ in lengths, lenslets' width and wavelength. Poses, noise and
 what is told are drawn anew in each run; the camera serves ``--each`` runs, which is what makes many
@@ -143,20 +143,20 @@ def found(bench, board, poses, names, what):
         ready = lg.prepare(raw, lenslets, white=white, dark=dark)
         with contextlib.suppress(lg.LumigraphError):
             light = {"in_views": what == "views", "wavelength": bench.camera.wavelength}
-            corners = lg.metric.find_corners([ready], board, **light)
+            corners = lg.metrology.find_corners([ready], board, **light)
             seen.append(
                 (replace(corners, frame=corners.frame + len(seen)), *away(bench.camera, board, corners, pose))
             )
     corners, off, points = zip(*seen, strict=True)
     columns = ("frame", "corner", "place", "center", "kind")
     joined = (np.concatenate([getattr(one, name) for one in corners[:-1]]) for name in columns)
-    whole = lg.metric.Corners(*joined, in_views=what == "views", spill=corners[0].spill)
+    whole = lg.metrology.Corners(*joined, in_views=what == "views", spill=corners[0].spill)
     return whole, np.concatenate(off), len(corners) - 1, (corners[-1], points[-1]), lenslets
 
 
 def away(true, board, corners, pose):
     """Corners less where rays put them (n, 2) [px], and where they are (n, 3) [m], from the likelier end."""
-    ideal, points = lg.metric.MetricCamera.of(true), geometry.moved(board.points(), pose)
+    ideal, points = lg.metrology.MetricCamera.of(true), geometry.moved(board.points(), pose)
     ideal, both = replace(ideal, gains=(1.0,)), []
     for each in (points[corners.corner], points[::-1][corners.corner]):
         kind = 0 * corners.kind
@@ -175,10 +175,10 @@ def run(bench, rng, what, pictures, place):
     Files are in a folder, which a context gives.
     """
     true, written = bench.camera, BOARDS["views" if what == "views" else "focused"]
-    board = lg.metric.Board.from_text(written)
-    ideal = lg.metric.MetricCamera.of(true)
+    board = lg.metrology.Board.from_text(written)
+    ideal = lg.metrology.MetricCamera.of(true)
     told, pitch = (1 + rng.normal(0, part) for part in (KNOWN, PITCH))
-    nominal = lg.metric.Nominal(
+    nominal = lg.metrology.Nominal(
         told * ideal.focal_length, ideal.pixel_pitch, true.sensor.shape, pitch_ratio_error=PITCH,
         pitch_ratio=1 + ideal.lenslet_distance / ideal.separation,
     )  # fmt: skip
@@ -188,7 +188,7 @@ def run(bench, rng, what, pictures, place):
     with place as kept:
         names = exposed(bench, board, poses, rng, kept)
         seen, off, pictures, last, lenslets = found(bench, board, poses, names, what)
-        lg.metric.save_corners(seen, kept / "corners.csv")
+        lg.metrology.save_corners(seen, kept / "corners.csv")
         mask = pitch * true.lenslets.pitch
         options = {
             "--board": written, "--focal-length": f"{1e3 * nominal.focal_length} mm",
@@ -201,11 +201,11 @@ def run(bench, rng, what, pictures, place):
             size = map(str, true.sensor.shape)
             if command(["board", str(kept / "corners.csv"), "--shape", *size, *words]):
                 raise lg.LumigraphError(out.getvalue())
-        measured = lg.metric.load(kept / "camera.json")
+        measured = lg.metrology.load(kept / "camera.json")
     corners, points = last
     mine = corners.sights() == np.bincount(corners.sights()).argmax()
     point = points[mine][0]
-    seen = lg.metric.triangulate(
+    seen = lg.metrology.triangulate(
         measured, corners.place[mine], corners.center[mine], corners.kind[mine], in_views=what == "views"
     )
     errors = np.append(measured.camera.numbers[:3] - ideal.numbers[:3], seen.position[0] - point[0])

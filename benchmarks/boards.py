@@ -3,10 +3,10 @@
 ``python -m benchmarks.boards focused | kinds | views [--runs 25] [--first 0] [--seed 0] [--known 0.02]``:
 each run draws a camera (focal length, distances, exit pupil, axis, tilt, distortion, gains of the kinds). It
 gives a white image and pictures of a board at drawn poses, by rays and with 1 % of noise. The array is
-calibrated on the white image, corners are found, and `lg.metric.board` measures the camera, told a focal
+calibrated on the white image, corners are found, and `lg.metrology.board` measures the camera, told a focal
 length that is off by chance, as a data sheet's is, by ``--known`` (one standard deviation); with ``--pitch
 1e-4`` the lenslets' pitch, too, off by that part. ``--planned 8`` takes eight pictures at the poses of
-`lg.metric.plan`, instead of five (of a camera 1.0 six) drawn ones near the plane in focus. A point that took
+`lg.metrology.plan`, instead of five (of a camera 1.0 six) drawn ones near the plane in focus. A point that took
 no part is triangulated with the result, from places as exact as corners are.
 """
 
@@ -77,10 +77,10 @@ def drawn_poses(rng, board, views):
 
 
 def planned_poses(rng, camera, board, nominal, count, views):
-    """The same, as `lg.metric.plan` asks for by what data sheets say, to 3 degrees and 1 %."""
+    """The same, as `lg.metrology.plan` asks for by what data sheets say, to 3 degrees and 1 %."""
     from metrology import drawn
 
-    plan = lg.metric.plan(*camera, board, nominal, pictures=count, in_views=views)
+    plan = lg.metrology.plan(*camera, board, nominal, pictures=count, in_views=views)
 
     def draw(step):
         turn = np.array(step.turn) + rng.normal(0, 0.05, 3)
@@ -103,7 +103,7 @@ def pictures(rng, true, white, found, poses):
             )
             ready = lg.prepare(lg.RawImage(raw), found, white=white)
             try:
-                one = lg.metric.find_corners([ready], board, found, in_views=views, wavelength=None)
+                one = lg.metrology.find_corners([ready], board, found, in_views=views, wavelength=None)
                 break
             except lg.LumigraphError:
                 again += 1
@@ -112,7 +112,7 @@ def pictures(rng, true, white, found, poses):
         frames.append(replace(one, frame=0 * one.frame + len(frames)))
     columns = ("frame", "corner", "place", "center", "kind")
     whole = (np.concatenate([getattr(one, name) for one in frames]) for name in columns)
-    return lg.metric.Corners(*whole, in_views=views), again
+    return lg.metrology.Corners(*whole, in_views=views), again
 
 
 def run(rng, what, known, pitch=None, planned=None):
@@ -127,7 +127,7 @@ def run(rng, what, known, pitch=None, planned=None):
     if kinds == 3:  # which lenslets are of which kind no white image tells
         found = drawing.calibration(kinds)
     told = true.focal_length * (1 + rng.normal(0, known))
-    nominal = lg.metric.Nominal(told, true.pixel_pitch, drawing.SHAPE, focal_length_error=known)
+    nominal = lg.metrology.Nominal(told, true.pixel_pitch, drawing.SHAPE, focal_length_error=known)
     if pitch:
         lenslets = drawing.PITCH / (1 + true.lenslet_distance / true.exit_pupil) * (1 + rng.normal(0, pitch))
         nominal = replace(nominal, pitch_ratio=found.lattice.pitch / lenslets, pitch_ratio_error=pitch)
@@ -137,12 +137,12 @@ def run(rng, what, known, pitch=None, planned=None):
     else:
         draws = drawn_poses(rng, board, not kinds)
     corners, again = pictures(rng, true, white, found, (kinds, board, draws))
-    measured = lg.metric.board(corners, board, nominal)
+    measured = lg.metrology.board(corners, board, nominal)
     off = measured.camera.numbers[:3] - true.numbers[:3]
     point = np.array([rng.uniform(0.43, 0.47), *rng.uniform(-3e-3, 3e-3, 2)])
     seen, noise = sighted(true, point, found, not kinds), measured.residual_px
     seen = (seen[0] + rng.normal(0, noise, seen[0].shape), seen[1])
-    place = lg.metric.triangulate(measured, *seen, in_views=not kinds)
+    place = lg.metrology.triangulate(measured, *seen, in_views=not kinds)
     off = np.append(off, place.position[0] - point[0])
     truth = np.append(true.numbers[:3], point[0])
     said = np.append(measured.errors[:3], place.errors[0])

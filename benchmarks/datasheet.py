@@ -85,7 +85,7 @@ def main():
         for seed in SEEDS:
             started = time.process_time()
             charts = lights.exposed(np.random.default_rng(seed), exposures=given.exposures)
-            sheet = lg.metric.datasheet(charts)
+            sheet = lg.metrology.datasheet(charts)
             sheets.append({q.name: q for q in sheet.quantities()})
             repeats = {one.quantity.name: one.repeats for one in sheet.planes[0].entries}
             slowest = max(slowest, simulated + time.process_time() - started)

@@ -3,7 +3,7 @@
 *antinous* has 9 x 9 views of 512² in colour and its true disparity. *cotton* and *kitchen* have stars of 33
 views (a row, a column, two diagonals), and as reference the estimate of a learned method: of *cotton* within
 1 % of the truth; of *kitchen* by an older one, all but a border of 11 px. Each is also measured on the 9
-views at the ends and the middle of the star. Scenes that are not there (lumigraphDATA) are left out.
+views at the ends and the middle of the star. Scenes that are not there (LUMIGRAPH_DATA) are left out.
 
     python -m benchmarks.depth [scene ...]
 """
@@ -20,7 +20,7 @@ from PIL import Image
 
 import lumigraph as lg
 
-DATA = Path(os.environ.get("lumigraphDATA") or Path(__file__).parents[2] / "shared" / "data")
+DATA = Path(os.environ.get("LUMIGRAPH_DATA") or Path(__file__).parents[2] / "shared" / "data")
 BAD = 0.07  # px: the benchmark's usual limit
 
 
@@ -95,7 +95,7 @@ def show(rows: Sequence[dict[str, Any]]) -> None:
     from rich.table import Table
 
     if not rows:
-        print("skipped: no scene is there. Set lumigraphDATA to a folder that holds hci_antinous.")
+        print("skipped: no scene is there. Set LUMIGRAPH_DATA to a folder that holds hci_antinous.")
         return
     table = Table(*rows[0])
     for row in rows:

@@ -7,7 +7,7 @@ soft edges), or simulated by wave optics for cameras of several kinds; then pixe
 with the right calibration, and with ones whose pitch is 1 % off or that are turned by 0.5 deg. A wrong pair
 should be found where the raw image has gaps (`gaps`, measured on it), where at least half of the places
 between lenslets are dark beside the light around them, and where it slips by the 0.1 of a pitch towards the
-border that is warned of. Real raw images (lumigraphDATA), too. Results are kept in a file of JSON lines, so
+border that is warned of. Real raw images (LUMIGRAPH_DATA), too. Results are kept in a file of JSON lines, so
 that a run goes on where it was stopped.
 
     python -m benchmarks.drift [drawn | simulated | edges | real] [first:last] [-o results.jsonl]
@@ -31,7 +31,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
 from lumigraph.preparation.drift import drift, verdict
 
-DATA = Path(os.environ.get("lumigraphDATA") or Path(__file__).parents[2] / "shared" / "data")
+DATA = Path(os.environ.get("LUMIGRAPH_DATA") or Path(__file__).parents[2] / "shared" / "data")
 REAL = {
     "guv": ("lfm_guv/Lightfield_GUVExperim1.tif", "lfm_guv/Radiometry_GUVExperim1.tif"),
     "guv, white": ("lfm_guv/Radiometry_GUVExperim1.tif",) * 2,

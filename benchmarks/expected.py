@@ -3,7 +3,7 @@
 An error at a place is taken to be of the mean Σ factor · term; the factors are those of the greatest Poisson
 likelihood of all errors, found by Richardson and Lucy's steps, which keep them above zero. What `expected`
 adds where other values explain an area as well is left out. Scenes
-that are not there (lumigraphDATA) are left out.
+that are not there (LUMIGRAPH_DATA) are left out.
 
     python -m benchmarks.expected [scene ...]
 """
@@ -72,4 +72,4 @@ if __name__ == "__main__":
     if set(CHOSEN) & set(measured):
         show(measured, LINES, CHOSEN)
     else:
-        print("skipped: no scene is there. Set lumigraphDATA to a folder that holds hci_antinous.")
+        print("skipped: no scene is there. Set LUMIGRAPH_DATA to a folder that holds hci_antinous.")

@@ -5,8 +5,8 @@
 Along the axis one square lenslet, as `tests/elements/test_surface.py` has it; aslant one cylindrical lenslet
 of the same width, whose waves have two dimensions, around the place where its chief ray arrives. n = 1.5,
 550 nm, the curved side towards the sensor in its focal plane; relative rms within 8 λ f/p, aslant 6 λ f/p, at
-equal power. *model* is `GlassSurface`, *sagitta* the path (n - 1) s of the surface at the same height, *ideal* a
-lenslet free of spherical aberration.
+equal power. *model* is `GlassSurface`, *sagitta* the path (n - 1) s of the surface at the same height,
+*ideal* a lenslet free of spherical aberration.
 """
 
 import numpy as np

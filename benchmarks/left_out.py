@@ -1,4 +1,4 @@
-"""Real corners of pictures that took no part: are they off by what `lg.metric.Measured.locate` expects?
+"""Real corners of pictures that took no part: are they off by what `lg.metrology.Measured.locate` expects?
 
 ``python -m benchmarks.left_out FOLDER [--pictures 12]``: of a folder of COMPOTE's data, each picture is left
 out in turn, the camera is measured by the others, and the board is found on the picture left out. It prints
@@ -21,12 +21,12 @@ def main():
     parser.add_argument("--pictures", type=int)
     given = parser.parse_args()
     warnings.simplefilter("ignore")
-    corners, board, nominal = lg.metric.load_compote(given.folder)
+    corners, board, nominal = lg.metrology.load_compote(given.folder)
     started, ratios = time.process_time(), []
     frames = corners.frames[: given.pictures]
     for frame in frames.tolist():
         out = corners.frame == frame
-        measured = lg.metric.board(corners[~out], board, nominal)
+        measured = lg.metrology.board(corners[~out], board, nominal)
         (pose,) = measured.locate(corners[out])
         ratios.append(pose.residual_px / pose.expected_px)
         print(

@@ -122,7 +122,7 @@ def main() -> None:
     for name in options.only:
         child = subprocess.run(
             [sys.executable, "-W", "ignore", "-m", "benchmarks.memory", "--child", name],
-            check=True, capture_output=True, text=True, env=os.environ | {"lumigraphCACHE": "off"},
+            check=True, capture_output=True, text=True, env=os.environ | {"LUMIGRAPH_CACHE": "off"},
         )  # fmt: skip
         row = {key: value / 2**20 for key, value in json.loads(child.stdout).items()}
         ratio = row["said"] / row["used"]

@@ -2,7 +2,7 @@
 
 lfm-guv at 15 pixels and 5 samples per lenslet, -4 to 4 um in steps of 2 um; with SLICES=13, -6 to 6 um in
 steps of 1 um. Iterations are medians; point images include the matrices of their frequencies. pyolaf is
-run as a black box in an environment of its own: PYOLAF names its interpreter, lumigraphDATA the folder with
+run as a black box in an environment of its own: PYOLAF names its interpreter, LUMIGRAPH_DATA the folder with
 lfm_guv.
 """
 
@@ -57,7 +57,7 @@ print(json.dumps({"images": images, "iteration": float(np.median(np.diff(times))
 
 def run() -> dict[str, dict[str, float]]:
     """Seconds by program; point images are computed, whatever the cache folder holds."""
-    os.environ["lumigraphCACHE"] = "off"
+    os.environ["LUMIGRAPH_CACHE"] = "off"
     scope = LightFieldMicroscope.from_catalogue("lfm-guv").replace(objective={"model": "scalar"})
     start = time.process_time()
     operator = scope.operator(DEPTHS, 5, pixels=15, accuracy=1e-2)
@@ -67,7 +67,7 @@ def run() -> dict[str, dict[str, float]]:
     times = []
     deconvolve(raw, operator, 16, progress=lambda step: times.append(time.process_time()))
     found = {"lumigraph": {"images": images, "iteration": float(np.median(np.diff(times)))}}
-    python, data = os.environ.get("PYOLAF"), os.environ.get("lumigraphDATA")
+    python, data = os.environ.get("PYOLAF"), os.environ.get("LUMIGRAPH_DATA")
     if python and data:
         command = [python, "-c", BLACK_BOX, f"{data}/lfm_guv", str(FARTHEST), str(STEP)]
         told = subprocess.run(command, capture_output=True, text=True, check=True).stdout

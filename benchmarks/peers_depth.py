@@ -2,7 +2,7 @@
 
 9 x 9 views of 512² in colour, and the true disparity of the middle view; the whole picture counts. plenpy
 (GPL) is run as a black box, in a virtual environment of its own in build/, made by
-`python -m venv` and pip; where that cannot be had, or the scene is not there (lumigraphDATA), its rows are
+`python -m venv` and pip; where that cannot be had, or the scene is not there (LUMIGRAPH_DATA), its rows are
 left out.
 
     python -m benchmarks.peers_depth
@@ -21,7 +21,7 @@ import numpy as np
 
 import lumigraph as lg
 
-DATA = Path(os.environ.get("lumigraphDATA") or Path(__file__).parents[2] / "shared" / "data")
+DATA = Path(os.environ.get("LUMIGRAPH_DATA") or Path(__file__).parents[2] / "shared" / "data")
 SCENE = DATA / "hci_antinous"
 HOME = Path(__file__).parents[1] / "build" / "peers-plenpy"
 PEER = """
@@ -103,7 +103,7 @@ def show(rows: Sequence[dict[str, Any]]) -> None:
     from rich.table import Table
 
     if not rows:
-        print("skipped: the scene is not there. Set lumigraphDATA to a folder that holds hci_antinous.")
+        print("skipped: the scene is not there. Set LUMIGRAPH_DATA to a folder that holds hci_antinous.")
         return
     table = Table(*rows[0])
     for row in rows:

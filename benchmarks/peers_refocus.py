@@ -3,7 +3,7 @@
 9 x 9 views of 512² in colour, one thread. lumigraph shifts each view by fractions of a pixel, PlenoptiCam by
 whole ones, which is less work. PlenoptiCam (GPL) is run as a black box, in a virtual environment of its own
 in build/, made by `python -m venv` and pip; where that cannot be had, or the scene is not there
-(lumigraphDATA), its row is left out.
+(LUMIGRAPH_DATA), its row is left out.
 
     python -m benchmarks.peers_refocus
 """
@@ -20,7 +20,7 @@ import numpy as np
 
 import lumigraph as lg
 
-DATA = Path(os.environ.get("lumigraphDATA") or Path(__file__).parents[2] / "shared" / "data")
+DATA = Path(os.environ.get("LUMIGRAPH_DATA") or Path(__file__).parents[2] / "shared" / "data")
 SCENE = DATA / "hci_antinous"
 HOME = Path(__file__).parents[1] / "build" / "peers-plenopticam"
 PLANES = 20

@@ -233,7 +233,7 @@ def apart(function: str, *arguments: Any) -> list[Row]:
         "--call",
         json.dumps([function, *arguments]),
     ]
-    environment = {**os.environ, "lumigraphCACHE": "off"}
+    environment = {**os.environ, "LUMIGRAPH_CACHE": "off"}
     done = subprocess.run(words, env=environment, capture_output=True, text=True)
     if done.returncode:
         return [{"failed": " ".join(words[3:]), "because": (done.stderr.splitlines() or [""])[-1]}]

@@ -1,4 +1,4 @@
-"""A simulated bench that is out of place: how exactly `lg.metric.twin` says so, and whether it is ever wrong.
+"""A simulated bench that is out of place: how exactly `lg.metrology.twin` says so, and whether it is ever wrong.
 
 ``python -m benchmarks.twin [--runs 5] [--pictures 1] [--lenslets 41] [--seed 0] [--pitch 0]`` draws ±1 degree
 of tilt about both axes, ±0.3 mm of height, ±30 µm of shift, ±5 mrad of turn and ±5 % of aperture at once,
@@ -78,7 +78,7 @@ def main():
     parser.add_argument("--untold", action="store_true")
     parser.add_argument("--claimed", type=float)
     given = parser.parse_args()
-    rng, bench = np.random.default_rng(given.seed), lg.metric.BenchModel(camera(given.lenslets))
+    rng, bench = np.random.default_rng(given.seed), lg.metrology.BenchModel(camera(given.lenslets))
     sensor, off, sure, wrong, started = bench.camera.sensor, [], [], 0, time.process_time()
     for _ in range(given.runs):
         tilt, shift = np.radians(rng.uniform(-1, 1, 2)), rng.uniform(-30e-6, 30e-6, 2)
@@ -89,7 +89,7 @@ def main():
         raws = [sensor.expose(light, fill=0.8, rng=rng) for _ in range(given.pictures)]
         known = None if given.untold else given.claimed or max(1e-5, given.pitch / math.sqrt(3))
         dark = sensor.expose(0 * light, reference=1, rng=rng)
-        found = lg.metric.twin(raws, bench, dark=dark, pitch_error=known)
+        found = lg.metrology.twin(raws, bench, dark=dark, pitch_error=known)
         off.append(found.values - true)
         sure.append(found.errors)
         told = np.abs(found.values) > SURE * found.errors

@@ -2,7 +2,7 @@
 
 The sample is of napari-LF, without a white image: the lattice is found on the raw image. The frame, the
 outermost lenslet on all sides, takes the light that comes from beside the picture; it should be no brighter
-than the inside. The other stack (lumigraphDATA/lfm_mouse_brain) has the same planes in the opposite order
+than the inside. The other stack (LUMIGRAPH_DATA/lfm_mouse_brain) has the same planes in the opposite order
 (its z points the other way: in its own order planes out of focus are not alike), and three samples for each
 lenslet, too; it is moved to where the two stacks are most alike.
 
@@ -20,7 +20,7 @@ import numpy as np
 import lumigraph as lg
 from lumigraph.cli import main as lumigraph
 
-DATA = Path(os.environ.get("lumigraphDATA") or Path(__file__).parents[2] / "shared" / "data")
+DATA = Path(os.environ.get("LUMIGRAPH_DATA") or Path(__file__).parents[2] / "shared" / "data")
 FOLDER = DATA / "lfm_mouse_brain"
 PLANES, STEP, SAMPLES = 63, 0.9, 3  # of the other stack: how many, um, and samples along a lenslet
 CAMERA = """kind = "light-field-microscope"

@@ -20,7 +20,7 @@ def pytest_configure(config):
         importlib.import_module("torch").set_default_device(config.getoption("--device"))
     if not hasattr(config, "workerinput"):
         config.kept = tempfile.mkdtemp(prefix="lumigraph-tests-")
-        os.environ["lumigraphCACHE"] = config.kept
+        os.environ["LUMIGRAPH_CACHE"] = config.kept
 
 
 def pytest_unconfigure(config):

@@ -1,6 +1,7 @@
 """The house itself: public names, import floors, nothing of a workplace in the text."""
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -134,3 +135,37 @@ def test_instruments_are_told_apart_by_what_they_can_do(what):
         if re.search(BY_NAME[what], line)
     ]
     assert not told
+
+
+@pytest.mark.parametrize("mended", [True, False])
+def test_a_module_whose_doctests_are_collected_is_the_one_that_its_package_imports(mended, tmp_path):
+    """By src/conftest.py; without it pytest executes the module again, and its classes are there twice."""
+    room, tests = tmp_path / "src" / "room", tmp_path / "tests"
+    room.mkdir(parents=True)
+    tests.mkdir()
+    (room / "__init__.py").write_text("from room.inner import Thing\n")
+    (room / "inner.py").write_text('class Thing:\n    """\n    >>> 1\n    1\n    """\n')
+    (tests / "test_it.py").write_text(
+        "import room, room.inner\ndef test_it(): assert room.Thing is room.inner.Thing\n"
+    )
+    if mended:
+        (tmp_path / "src" / "conftest.py").write_text((ROOT / "src" / "conftest.py").read_text("utf-8"))
+    words = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "--doctest-modules",
+        "--import-mode=importlib",
+        "src/room/inner.py",
+        "tests",
+    ]
+    run = subprocess.run(
+        words,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": "src"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ("2 passed" in run.stdout, "1 failed, 1 passed" in run.stdout) == (mended, not mended), run.stdout

@@ -12,7 +12,7 @@ from lumigraph.core.linear import Linear
 from lumigraph.core.matrix import Matrix
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.deconvolution import Exposure
-from lumigraph.instruments import FoundShifts
+from lumigraph.metrology.scanning import FoundShifts
 from lumigraph.operators import periodic_operator, single_lens_operator
 
 N = 700

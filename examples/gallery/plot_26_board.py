@@ -30,8 +30,8 @@ for frame in range(5):
 table = np.array(rows)
 whole = table[:, :2].astype(int)
 corners = Corners(whole[:, 0], whole[:, 1], table[:, 2:4], table[:, 4:6], np.zeros(len(table), int))
-lg.metric.save_corners(corners, "corners.csv")
-measured = lg.metric.board(corners, target, Nominal(50 * mm, 5.5 * um, (3068, 4080)))
+lg.metrology.save_corners(corners, "corners.csv")
+measured = lg.metrology.board(corners, target, Nominal(50 * mm, 5.5 * um, (3068, 4080)))
 
 # %%
 # What was found, each with the interval that holds it with a probability of 95 %:
@@ -50,7 +50,7 @@ for z in distances:
     shown = truth.project(point, lenslets)
     lit = np.hypot(*(shown - lenslets).T) < 10
     seen = shown[lit] + rng.normal(0, 0.3, (lit.sum(), 2))
-    found = lg.metric.triangulate(measured, seen, lenslets[lit])
+    found = lg.metrology.triangulate(measured, seen, lenslets[lit])
     errors.append(abs(found.position[0] - z))
     expected.append(found.errors[0])
 figure = lg.plots.curves(

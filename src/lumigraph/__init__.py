@@ -9,7 +9,7 @@ The everyday names, listed in `__init__.pyi`; each is imported when it is first 
 7.8
 """
 
-from lumigraph.core import drawing
+from lumigraph.core import upper_floors
 
 __version__ = "0.1.0"
 
@@ -32,4 +32,10 @@ def __dir__() -> list[str]:
     return __getattr__("__all__")
 
 
-drawing.done_by(lambda: __getattr__("plots"))
+def _describe() -> "Any":
+    from importlib import import_module
+
+    return import_module("lumigraph.describe")
+
+
+upper_floors.register(plots=lambda: __getattr__("plots"), describe=_describe)

@@ -1,18 +1,16 @@
 """The everyday names and where they come from; `lazy_loader` reads this file, and so do type checkers."""
 
 from . import (
-    adaptive as adaptive,
     analysis as analysis,
     cluster as cluster,
     depth as depth,
     design as design,
-    information as information,
-    metric as metric,
+    metrology as metrology,
     plots as plots,
     samples as samples,
-    tolerance as tolerance,
     units as units,
 )
+from .studies import adaptive as adaptive, information as information, tolerance as tolerance
 from .calibration import calibrate as calibrate, devignette as devignette
 from .core.calibration import Calibration as Calibration
 from .core.cloud import PointCloud as PointCloud
@@ -49,11 +47,9 @@ from .instruments import (
     PlenopticCamera as PlenopticCamera,
     SingleLensCamera as SingleLensCamera,
     catalogue as catalogue,
-    find_shifts as find_shifts,
-    joint_operator as joint_operator,
     load_camera as load_camera,
-    scan as scan,
 )
+from .metrology.scanning import find_shifts as find_shifts, joint_operator as joint_operator, scan as scan
 from .io import contents as contents, open as open, save as save
 from .studies.optimisation import Goal as Goal, optimise as optimise
 from .preparation import (

@@ -44,7 +44,7 @@ def test_centres_are_true_on_noisy_tilted_pictures_with_dead_lenslets(layout, pi
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("pitch", PITCHES)
 @pytest.mark.parametrize("layout", ["square", "hex"])
 def test_centres_are_true_at_all_pitches(layout, pitch, seed):

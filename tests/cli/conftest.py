@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import lumigraph.io as io
+from cluster_jobs import Here
+from lumigraph import cluster
 from lumigraph.cli import console, main
 from lumigraph.core.raw import RawImage
 
@@ -73,3 +75,9 @@ def bench(tmp_path):
     (tmp_path / "camera.toml").write_text(CAMERA)
     (tmp_path / "focused.toml").write_text(FOCUSED)
     return tmp_path
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Batches do their frames in this process: other tests start a worker for each verb."""
+    monkeypatch.setattr(cluster, "Local", lambda count: Here())

@@ -61,32 +61,51 @@ def test_files_that_are_not_there_are_told_before_any_worker_starts(said, why, v
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.skipif(os.name == "nt", reason="a shell script stands in for sbatch")
-def test_a_queue_gets_a_part_for_each_job(views, tmp_path, monkeypatch):
-    """With a stand-in for sbatch, which runs the jobs one after the other: no SLURM is here."""
+@pytest.fixture
+def sbatch(tmp_path, monkeypatch):
+    """A function of a shell's line: a stand-in for sbatch that does it, as no SLURM is here."""
+    if os.name == "nt":
+        pytest.skip("a shell script stands in for sbatch")
     stand_in = tmp_path / "bin" / "sbatch"
     stand_in.parent.mkdir()
-    stand_in.write_text(
-        '#!/bin/sh\nfor k in 1 2; do SLURM_ARRAY_TASK_ID=$k sh "$2" > /dev/null || exit 1; done\necho 47'
-    )
-    stand_in.chmod(stand_in.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("PATH", f"{stand_in.parent}{os.pathsep}{os.environ['PATH']}")
+
+    def written(line):
+        stand_in.write_text(f"#!/bin/sh\n{line}\necho 47")
+        stand_in.chmod(stand_in.stat().st_mode | stat.S_IXUSR)
+
+    return written
+
+
+QUEUED = ("--workers", "1", "--slurm", "2", "--sbatch", "--time=1:00 --mem=2G")
+
+
+def test_a_queue_is_asked_for_a_part_for_each_job(sbatch, views, tmp_path, capsys):
+    sbatch(f'cp "$2" "{tmp_path}/job.sh"')
     output = tmp_path / "out.zarr"
-    asked = ("--workers", "1", "--slurm", "2", "--sbatch", "--time=1:00 --mem=2G")
-    assert main(words(views, output, *asked)) == 0
-    script = (tmp_path / "out.zarr.ledger/job.sh").read_text()
+    assert main(words(views, output, *QUEUED)) == 0
+    assert "job 47 of SLURM: 2 parts" in capsys.readouterr().out
+    script = (tmp_path / "job.sh").read_text()
     assert "#SBATCH --array=1-2\n" in script
+    assert "#SBATCH --time=1:00\n" in script
     assert "#SBATCH --mem=2G\n" in script
-    assert lg.cluster.status(output).is_whole
+    (line,) = (line for line in script.splitlines() if " batch " in line)
+    assert " refocus " in line
+    assert " --workers 1" in line
+    assert '--part "$SLURM_ARRAY_TASK_ID/2"' in line
+    assert "--slurm" not in line
+    assert not output.exists()
 
 
-@pytest.mark.skipif(os.name == "nt", reason="a shell script stands in for sbatch")
-def test_no_queue_is_given_an_output_of_somebody_else(views, tmp_path, monkeypatch, capsys):
-    stand_in = tmp_path / "bin" / "sbatch"
-    stand_in.parent.mkdir()
-    stand_in.write_text("#!/bin/sh\necho 47")
-    stand_in.chmod(stand_in.stat().st_mode | stat.S_IXUSR)
-    monkeypatch.setenv("PATH", f"{stand_in.parent}{os.pathsep}{os.environ['PATH']}")
+@pytest.mark.long  # starts four interpreters
+def test_the_jobs_of_a_queue_do_it_together(sbatch, views, tmp_path):
+    sbatch('for k in 1 2; do SLURM_ARRAY_TASK_ID=$k sh "$2" > /dev/null || exit 1; done')
+    assert main(words(views, tmp_path / "out.zarr", *QUEUED)) == 0
+    assert lg.cluster.status(tmp_path / "out.zarr").is_whole
+
+
+def test_no_queue_is_given_an_output_of_somebody_else(sbatch, views, tmp_path, capsys):
+    sbatch("")
     lg.save(lg.open(views / "v0.zarr"), tmp_path / "mine.zarr")
     assert main(words(views, tmp_path / "mine.zarr", "--slurm", "2")) == 1
     assert "mine.zarr exists and has no ledger" in capsys.readouterr().err
@@ -107,7 +126,7 @@ def test_names_with_spaces_and_signs_reach_the_queue_as_they_are(tmp_path):
     assert "#SBATCH '--comment=a b'\n" in text
 
 
-def test_numbers_become_a_table(views, tmp_path):
+def test_numbers_become_a_table(here, views, tmp_path):
     for k in range(2):
         lg.save(np.random.default_rng(k).normal(100, 5, (20, 20)).astype(np.float32), tmp_path / f"{k}.tiff")
     assert main(["batch", "measure", "noise", f"{tmp_path}/*.tiff", "-o", str(tmp_path / "out.csv")]) == 0
@@ -135,7 +154,7 @@ def test_the_page_of_what_goes_on_is_read_again_and_says_what_failed(tmp_path):
     assert not lg.cluster.page(out).exists()
 
 
-def test_a_frame_that_fails_ends_it_with_an_error(views, tmp_path, capsys):
+def test_a_frame_that_fails_ends_it_with_an_error(here, views, tmp_path, capsys):
     (tmp_path / "a.zarr").symlink_to(views / "v0.zarr")
     (tmp_path / "b.zarr").mkdir()
     line = ["batch", "refocus", str(tmp_path / "a.zarr"), str(tmp_path / "b.zarr"), "--alpha", "1"]

@@ -15,7 +15,7 @@ KNOWN = ["--focal-length", "50 mm", "--pixel-pitch", "5.5 um", "--shape", "3068"
 
 @pytest.fixture
 def table(tmp_path):
-    lg.metric.save_corners(corners(np.random.default_rng(2), frames=4), tmp_path / "corners.csv")
+    lg.metrology.save_corners(corners(np.random.default_rng(2), frames=4), tmp_path / "corners.csv")
     return tmp_path / "corners.csv"
 
 
@@ -26,7 +26,7 @@ def test_a_table_of_corners_gives_a_camera_with_intervals(table, capsys) -> None
     found = json.loads(capsys.readouterr().out)
     low, high = found["lenslet_distance_interval"]
     assert low < 0.42e-3 < high
-    assert lg.metric.load(made).camera.focal_length == found["focal_length"]
+    assert lg.metrology.load(made).camera.focal_length == found["focal_length"]
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,14 @@ def test_what_is_missing_is_named(table, capsys, words, said) -> None:
     assert said in capsys.readouterr().err
 
 
-def test_a_plan_for_a_camera_1_says_what_stays_unknown(capsys) -> None:
+def test_a_plan_for_a_camera_1_knows_what_is_lit_and_says_what_stays_unknown(monkeypatch, capsys) -> None:
+    asked, plan = [], metrology.plan
+
+    def noted(camera, calibration, *given, **options):
+        asked.append(calibration)
+        return plan(camera, calibration, *given, **options)
+
+    monkeypatch.setattr(metrology, "plan", noted)
     words = [
         "board",
         "plan",
@@ -54,6 +61,9 @@ def test_a_plan_for_a_camera_1_says_what_stays_unknown(capsys) -> None:
         "3",
     ]
     assert main(words) == 0
+    camera = lg.load_camera("thesis-plenoptic-1")
+    lit = camera.pupil_diameter * camera.lenslet_distance / camera.separation
+    assert asked[0].fill == pytest.approx(min(lit / camera.micro_image_pitch, 1), rel=1e-6)
     said = capsys.readouterr().out
     assert said.count(" mm  ") >= 3
     assert "f, and with it L and distances, stays as well known as it is beforehand" in said
@@ -105,18 +115,3 @@ def test_squares_that_are_not_as_wide_as_said_are_refused_by_what_is_known_of_b(
 def test_half_of_what_is_known_of_the_array_is_refused(table, capsys, words, said) -> None:
     assert main(["board", str(table), *KNOWN, "--board", "7 x 5 corners, 10 mm", *words]) == 1
     assert said in capsys.readouterr().err
-
-
-def test_a_plan_knows_how_much_of_a_micro_image_is_lit(monkeypatch, capsys) -> None:
-    asked, plan = [], metrology.plan
-
-    def noted(camera, calibration, *given, **options):
-        asked.append(calibration)
-        return plan(camera, calibration, *given, **options)
-
-    monkeypatch.setattr(metrology, "plan", noted)
-    words = ["--camera", "thesis-plenoptic-1", "--board", "4 x 3 corners, 3 mm", "--pictures", "3"]
-    assert main(["board", "plan", *words]) == 0
-    camera = lg.load_camera("thesis-plenoptic-1")
-    lit = camera.pupil_diameter * camera.lenslet_distance / camera.separation
-    assert asked[0].fill == pytest.approx(min(lit / camera.micro_image_pitch, 1), rel=1e-6)

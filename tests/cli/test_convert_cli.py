@@ -13,13 +13,13 @@ SHAPE = (600, 800)
 
 @pytest.fixture(scope="module")
 def measured():
-    return lg.metric.board(corners(np.random.default_rng(2), frames=4), BOARD, NOMINAL)
+    return lg.metrology.board(corners(np.random.default_rng(2), frames=4), BOARD, NOMINAL)
 
 
 @pytest.fixture
 def files(tmp_path, measured):
     """camera.json, and calibrations of a square and of a hexagonal array."""
-    lg.metric.save(measured, tmp_path / "camera.json")
+    lg.metrology.save(measured, tmp_path / "camera.json")
     lattices = {
         "square": lg.Lattice.square(23.3, 0.002, (5.0, 6.0)),
         "hex": lg.Lattice.hex(23.3, 0.0, (5.0, 6.0)),

@@ -50,8 +50,8 @@ def test_a_raw_image_is_what_the_camera_sees_of_the_truth(made):
         assert expected.max() == pytest.approx(fill * (sensor.levels - sensor.black_level), rel=0.02)
 
 
-@pytest.mark.long  # another set is made: 6 s
-def test_cameras_drawn_within_tolerances_take_turns(camera, tmp_path):
+@pytest.mark.long  # another set is made
+def test_cameras_drawn_within_tolerances_take_turns(here, camera, tmp_path):
     out = tmp_path / "t.zarr"
     said = ["dataset", str(camera), "-n", "3", *DEPTHS, "-o", str(out), "--volume", "--workers", "1"]
     said += [
@@ -110,7 +110,7 @@ def test_the_card_says_what_it_is_and_the_line_makes_it_again(made):
     assert lg.cluster.status(made).is_whole
 
 
-def test_beads_and_photographs(camera, tmp_path):
+def test_beads_and_photographs(here, camera, tmp_path):
     out = tmp_path / "beads.zarr"
     said = ["dataset", str(camera), *DEPTHS, "--workers", "1"]
     assert main([*said, "-n", "1", "--layout", "beads", "-o", str(out)]) == 0

@@ -1,5 +1,6 @@
 """`lumigraph deconvolve`."""
 
+import functools
 import importlib
 import json
 
@@ -255,7 +256,7 @@ def test_a_single_lens_is_deconvolved_too(lumigraph, tmp_path):
     assert "has no lenslets to count --samples by" in refused.err
 
 
-def test_a_batch_warms_up_in_runs_that_are_the_same_whoever_does_them(lumigraph, tmp_path, rng):
+def test_a_batch_warms_up_in_runs_that_are_the_same_whoever_does_them(here, lumigraph, tmp_path, rng):
     """Frames 0 and 1 are those of the verb's own --warm; 2 begins cold, as if it stood alone."""
     (tmp_path / "scope.toml").write_text(SCOPE)
     film = rng.poisson(200, (3, 41, 41)).astype(np.uint16)
@@ -324,7 +325,14 @@ pixel_pitch = "10 um"
 
 
 @pytest.fixture
-def scanned(lumigraph, tmp_path):
+def rough(monkeypatch):
+    """Joint operators to 1e-2, which take less time; what is tested is which raw images go where."""
+    module = importlib.import_module("lumigraph.metrology.scanning.joint")
+    monkeypatch.setattr(module, "joint_operator", functools.partial(module.joint_operator, accuracy=1e-2))
+
+
+@pytest.fixture
+def scanned(rough, lumigraph, tmp_path):
     """A camera file and raw images of a blob, moved by halves of a lenslet, the last four times as long."""
     (tmp_path / "camera.toml").write_text(PLENOPTIC)
     camera = lg.load_camera(tmp_path / "camera.toml")
@@ -342,7 +350,7 @@ FILES = [f"raw{k}.tif" for k in range(4)]
 
 
 def test_raw_images_of_a_moved_object_are_deconvolved_together(scanned, tmp_path):
-    said = ("deconvolve", *FILES, "--camera", "camera.toml", "--iterations", 10)
+    said = ("deconvolve", *FILES, "--camera", "camera.toml", "--iterations", 10, "--samples", 6)
     found = scanned(*said, "--shifts", "2x2", "--light", "1,1,1,4", "-o", "picture.tiff")
     assert found.code == 0, found.err
     assert "times as bright" not in found.err
@@ -351,10 +359,11 @@ def test_raw_images_of_a_moved_object_are_deconvolved_together(scanned, tmp_path
     assert scanned(*said, "--shifts", pairs, "--light", "1,1,1,4", "-o", "pairs.tiff").code == 0
     np.testing.assert_allclose(lg.open(tmp_path / "pairs.tiff").data, picture.data, rtol=1e-4, atol=1e-3)
     camera = lg.load_camera(tmp_path / "camera.toml")
-    grid = lg.joint_operator(camera, shifts=lg.scan(2, camera.lenslet_size)).object_grid
+    shifts = lg.scan(2, camera.lenslet_size)
+    grid = lg.joint_operator(camera, None, 6, shifts=shifts, accuracy=1e-2).object_grid
     light = picture.data / picture.data.sum()
     assert (light.sum(1) @ grid.y, light.sum(0) @ grid.x) == pytest.approx((30e-6, -20e-6), abs=3e-6)
-    dim = scanned(*said, "--shifts", "2x2", "-o", "dim.tiff")
+    dim = scanned(*said[:-4], "--iterations", 1, *said[-2:], "--shifts", "2x2", "-o", "dim.tiff")
     assert "times as bright" in dim.err + dim.out
 
 
@@ -382,14 +391,14 @@ def test_what_is_no_set_of_raw_images_is_refused(lumigraph, tmp_path, words, mes
     assert message in " ".join(found.err.split())
 
 
-def test_shifts_are_found_before_raw_images_are_deconvolved_together(lumigraph, tmp_path):
+def test_shifts_are_found_before_raw_images_are_deconvolved_together(rough, lumigraph, tmp_path):
     (tmp_path / "camera.toml").write_text(PLENOPTIC.replace("[3, 3]", "[7, 7]"))
     camera = lg.load_camera(tmp_path / "camera.toml")
-    own, rng = camera.operator_grid(12), np.random.default_rng(3)
-    grid = lg.Grid(tuple(n + 48 for n in own.shape), own.pitch, own.center)
+    own, rng = camera.operator_grid(8), np.random.default_rng(3)
+    grid = lg.Grid(tuple(n + 32 for n in own.shape), own.pitch, own.center)
     true = lg.scan(2, camera.lenslet_size) + np.array([(0, 0), (9e-6, -7e-6), (-5e-6, 12e-6), (8e-6, 4e-6)])
-    joint = lg.joint_operator(camera, None, 12, shifts=true, grid=grid, accuracy=1e-2)
-    texture = gaussian_filter(rng.standard_normal(grid.shape), 3)
+    joint = lg.joint_operator(camera, None, 8, shifts=true, grid=grid, accuracy=1e-2)
+    texture = gaussian_filter(rng.standard_normal(grid.shape), 2)
     picture = np.clip(0.5 + 0.15 * texture / texture.std(), 0, None).astype(np.float32)
     for number, light in enumerate(joint.parted(joint.forward(picture))):
         lg.save(camera.sensor.expose(light, photons=1000, rng=rng), tmp_path / f"raw{number}.tif")

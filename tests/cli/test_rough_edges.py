@@ -75,7 +75,7 @@ def run(words, redirection):
     [(">&-", 0, ""), ("2>&-", 0, ""), (">/dev/full", 1, "No space left on device"), ("| true", 0, "")],
 )
 def test_a_closed_or_full_output_is_told_in_one_line(redirection, code, said):
-    result = run("design thesis-plenoptic-1 --json", redirection)
+    result = run("--version", redirection)
     assert result.returncode == code, result
     assert len(result.stderr.splitlines()) == bool(said)
     assert said in result.stderr

@@ -45,7 +45,7 @@ def patches():
     return [camera.replace(lenslets=lenslets).patch for lenslets in given]
 
 
-def test_a_table_as_parquet_has_the_numbers(tmp_path):
+def test_a_table_as_parquet_has_the_numbers(here, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is an extra")
     assert main(asked(tmp_path / "t.parquet")) == 0
     found = parquet.read_table(tmp_path / "t.parquet").to_pydict()
@@ -62,7 +62,7 @@ def test_without_pyarrow_a_line_says_what_to_install(tmp_path, capsys, monkeypat
     assert not list(tmp_path.iterdir())
 
 
-def test_netcdf_has_the_varied_keys_as_axes(tmp_path):
+def test_netcdf_has_the_varied_keys_as_axes(here, tmp_path):
     xarray = pytest.importorskip("xarray", reason="xarray is an extra")
     assert main(asked(tmp_path / "t.nc")) == 0
     with xarray.open_dataset(tmp_path / "t.nc", engine="scipy") as found:
@@ -74,7 +74,7 @@ def test_netcdf_has_the_varied_keys_as_axes(tmp_path):
         assert "lenslets.magnification is 0" in str(found.error.values[2, 1])
 
 
-def test_what_no_camera_can_have_is_a_row_with_the_reason(tmp_path, capsys):
+def test_what_no_camera_can_have_is_a_row_with_the_reason(here, tmp_path, capsys):
     out = tmp_path / "t.csv"
     said = ["sweep", CAMERA, "--vary", "lenslets.magnification=0.5,0", "--workers", "1", "-o", str(out)]
     assert main(said) == 0

@@ -53,8 +53,7 @@ def test_the_tables_are_what_the_library_finds(tmp_path, capsys):
     assert "deviation if halved" in page.read_text(encoding="utf-8")
 
 
-@pytest.mark.long  # workers are started twice: 8 s
-def test_a_part_says_how_it_stands_and_the_last_one_what_follows(tmp_path, capsys):
+def test_a_part_says_how_it_stands_and_the_last_one_what_follows(here, tmp_path, capsys):
     said = ["tolerance", CAMERA, *GIVEN, "-n", "8", "-o", str(tmp_path / "t.csv"), "--workers", "1"]
     assert main([*said, "--part", "1/2"]) == 0
     assert "6 of 13 frames are done; the last part reports" in capsys.readouterr().out

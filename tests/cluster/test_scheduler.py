@@ -1,5 +1,6 @@
 import importlib.util
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -99,3 +100,52 @@ def test_a_cluster_whose_parts_are_killed_gives_the_same_bits(tmp_path):
             assert (
                 tmp_path / "o.zarr" / one.relative_to(tmp_path / "p.zarr")
             ).read_bytes() == one.read_bytes()
+
+
+CERTIFICATE = ["req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost"]
+
+
+@pytest.mark.skipif(not WITH_DASK, reason="dask's distributed is not installed (.ci/oracles.txt)")
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl, which makes the certificates")
+def test_a_cluster_behind_tls_works_with_its_certificates_and_refuses_who_has_none(tmp_path, monkeypatch):
+    key, cert = tmp_path / "node.key", tmp_path / "node.pem"
+    subprocess.run(["openssl", *CERTIFICATE, "-keyout", key, "-out", cert], check=True, capture_output=True)
+    known = {"CA_FILE": cert}
+    for who in ("SCHEDULER", "WORKER", "CLIENT"):
+        known |= {f"{who}__CERT": cert, f"{who}__KEY": key}
+    tls = {f"DASK_DISTRIBUTED__COMM__TLS__{name}": str(path) for name, path in known.items()}
+    tls["DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION"] = "true"
+    tests = str(Path(jobs.__file__).parent)
+    environment = {**os.environ, **tls, "PYTHONPATH": os.pathsep.join([*sys.path, tests])}
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address, output = f"tls://127.0.0.1:{port}", tmp_path / "o.zarr"
+    script = SCRIPT.format(
+        tests=tests, items=[{"seed": k} for k in range(3)], output=str(output), address=address
+    )
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment}
+    host = ("--host", f"tls://127.0.0.1:{port}", "--no-dashboard")
+    work = (address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+    running = [
+        subprocess.Popen([sys.executable, "-m", f"distributed.cli.dask_{what}", *given], **quiet)
+        for what, given in (("scheduler", host), ("worker", work))
+    ]  # fmt: skip
+    try:
+        assert subprocess.run([sys.executable, "-c", script], env=environment, timeout=200).returncode == 0
+        assert cluster.status(output).is_whole
+        bare = {name: value for name, value in environment.items() if name not in tls}
+        stranger = subprocess.run(
+            [sys.executable, "-c", script.replace("o.zarr", "p.zarr")],
+            env=bare,
+            capture_output=True,
+            text=True,
+            timeout=200,
+        )
+        assert stranger.returncode != 0
+        assert "LumigraphError: no dask scheduler answers" in stranger.stderr
+        assert not (tmp_path / "p.zarr").exists()
+    finally:
+        for process in running:
+            process.kill()
+            process.wait()

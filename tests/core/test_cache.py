@@ -63,7 +63,7 @@ caches = [thing for thing in gc.get_objects() if isinstance(thing, ByteCache)]
 assert len(caches) >= 4 and all(cache._budget is SHARED for cache in caches), caches
 print(SHARED.limit)
 """
-    environment = {**os.environ, "lumigraphMEMORY": "100"}
+    environment = {**os.environ, "LUMIGRAPH_MEMORY": "100"}
     said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment)
     assert said.stdout.strip() == str(100 * 2**20), said.stderr
     assert 2**28 <= shared_limit() <= 2**32

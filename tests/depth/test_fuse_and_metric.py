@@ -183,3 +183,18 @@ def test_expected_errors_go_with_their_values_into_other_quantities():
     assert DepthMap(found.values, found.confidence, "alpha").usual_error is None
     with pytest.raises(GeometryError, match=r"values have shape \(1, 2\) and error \(2,\) but both"):
         DepthMap(found.values, found.confidence, "disparity", np.zeros(2))
+
+
+def test_diffractions_pull_is_part_of_the_expected_error():
+    """Of a camera 1.0 with p²/(λb) = 11: planes at 15 to 80 mm were off by 3 to 14 times what was said."""
+    views = LightField(np.zeros((9, 9, 1, 3)), Grid((9, 9), 5.7e-3 / 9), Grid((1, 3), 60e-6), 57.143e-3)
+    seen = np.array([[-0.0268, -0.1025, -0.2179]])  # by `epi`, of textured planes by wave optics
+    found = DepthMap(seen, np.ones((1, 3)), "disparity", np.array([[0.0075, 0.0072, 0.003]]))
+    depth = metric(found, views, focal_length=0.05, object_distance=0.4)
+    off = np.abs(depth.values - [[15e-3, 40e-3, 80e-3]])
+    assert (off < 2 * depth.error).all()
+    assert (off > 0.5 * depth.error).all()
+    blue = metric(found, views, focal_length=0.05, object_distance=0.4, wavelength=275e-9)
+    assert (blue.error < 0.6 * depth.error).all()
+    fixed = metric(found, views, focal_length=0.05, object_distance=0.4, correction=lambda alpha: alpha)
+    assert fixed.error is None

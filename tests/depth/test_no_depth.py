@@ -11,7 +11,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.depth import epi
 from lumigraph.depth.chance import by_chance
 from lumigraph.depth.pictures import Pictures
-from lumigraph.depth.repeats import repeats
+from lumigraph.depth.repeats import first_alike, repeats
 from lumigraph.errors import GeometryError, SamplingWarning
 
 CHANCE = "match no better than by chance"
@@ -177,3 +177,18 @@ def test_values_that_are_no_light_are_refused():
         epi(field(views.data - 0.8))
     for unit in (1e60, 1e-60):  # not of single precision: no number warns
         assert np.abs(epi(field(unit * views.data)).values - truth).mean() < 0.01
+
+
+def test_what_looks_alike_is_judged_above_the_noise():
+    """Half the mean square of a picture that repeats every 2 px: noise, and its texture in between."""
+    moves, noise, variance = np.arange(0.1, 4, 0.1), 0.3, np.array([1.0, 0.31, 0.29, 20.0])
+    texture = np.sin(np.pi * moves / 2)[:, None] ** 2 * variance
+    found = first_alike(noise + texture, moves, variance, noise)
+    # A texture below the noise looks alike anyway.
+    assert found == pytest.approx([2.0, 2.0, 0.0, 2.0], abs=0.01)
+    off = noise + texture + 0.06 * variance  # by more than places alike may differ
+    assert not first_alike(off, moves, variance, noise).any()
+    near = noise + texture + 0.04 * variance
+    assert first_alike(near, moves, variance, noise)[[0, 3]] == pytest.approx([2.0, 2.0], abs=0.01)
+    flat = noise + 0.29 * texture  # never quite different
+    assert not first_alike(flat, moves, variance, noise).any()

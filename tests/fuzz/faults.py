@@ -21,7 +21,8 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 import lumigraph as lg
-from lumigraph import io, store
+from lumigraph import cluster, io, store
 from lumigraph.store import atomic
 from lumigraph.studies.thesis.registry import Context
 
@@ -297,11 +298,62 @@ def flips(files: dict[str, dict[str, np.ndarray]], count: int, seed: int = 0) ->
     return found, wrong, sick
 
 
+def flipped_batches(name: str, count: int, seed: int = 0) -> tuple[int, list[str]]:
+    """(found, what went wrong) of bits flipped in a batch's ledger, or in what describes its store.
+
+    The next start must end with the bits of the first one, or refuse.
+    """
+    rng, found, wrong = np.random.default_rng(seed), 0, list[str]()
+    with tempfile.TemporaryDirectory() as place:
+        output = Path(place) / "o.zarr"
+        begun = [cluster.batch(_noise, [0, 1], output, workers=_HERE)]
+        first = {path: path.read_bytes() for path in sorted(Path(place).rglob("*")) if path.is_file()}
+        path = (output if "zarr.json" in name else output.with_name("o.zarr.ledger")) / name
+        for _ in range(count):
+            content = bytearray(first[path])
+            bit = int(rng.integers(8 * len(content)))
+            content[bit // 8] ^= 1 << bit % 8
+            path.write_bytes(content)
+            try:
+                begun = [cluster.batch(_noise, [0, 1], output, workers=_HERE)]
+                found += 1
+            except lg.FormatError:
+                found += 1
+                path.write_bytes(first[path])
+            except Exception as error:
+                wrong.append(f"bit {bit}: {type(error).__name__}")
+            shards = [each for each in first if output in each.parents]
+            if not begun[0].is_whole or any(each.read_bytes() != first[each] for each in shards):
+                wrong.append(f"bit {bit}: other bits")
+    return found, wrong
+
+
+def _noise(item: int) -> dict[str, np.ndarray]:
+    return {"a": np.random.default_rng(item).random((8, 9))}
+
+
+class _Here:
+    """Works in this process."""
+
+    is_here, count = True, 1
+
+    @contextmanager
+    def group(self, task: Any) -> Iterator["_Here"]:
+        self.task = task
+        yield self
+
+    def each(self, numbers: Any) -> Any:
+        yield from self.task.do(numbers)
+
+
+_HERE = _Here()
+
+
 def kept_files() -> dict[str, dict[str, np.ndarray]]:
     """What a camera, a microscope, a deconvolution and an experiment really keep."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        os.environ["lumigraphCACHE"] = str(folder)
+        os.environ["LUMIGRAPH_CACHE"] = str(folder)
         camera = lg.FocusedPlenopticCamera.from_catalogue("thesis-plenoptic-2-m050")
         camera.replace(lenslets={"count": (3, 3)}).operator(accuracy=1e-2)
         microscope = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(lenslets={"count": (3, 3)})
@@ -325,7 +377,11 @@ def main() -> int:
         files = kept_files()
         found, wrong, sick = flips(files, given.count)
         print(f"{given.count} flips in {len(files)} files: {found} found, {wrong} wrong, {sick} not healed")
-        return int(wrong > 0 or sick > 0)
+        names = ("done/000001.json", "job.json", "store.json", "zarr.json", "a/zarr.json")
+        batches = {name: flipped_batches(name, given.count // 20) for name in names}
+        for name, (of, bad) in batches.items():
+            print(f"{name:17} {of} healed or refused, {len(bad)} wrong {bad[:3]}")
+        return int(wrong > 0 or sick > 0 or any(bad for _, bad in batches.values()))
     if given.what == "runs":
         import scenarios
 

@@ -45,9 +45,9 @@ SECONDS, MEMORY, BATCH, STRUCTURAL = 20, 1 << 30, 250, 0.3
 WATCHED, GUIDED = 8, 0.4  # one child of so many is watched; share of mutants made of those that it found
 MOST_SEEDS, LARGEST_SEED = 300, 100_000  # of new seeds: their number, and the bytes of one
 METRIC = {
-    "corners.csv": lg.metric.load_corners,
-    "compote": lg.metric.load_compote,
-    "measured.json": lambda path: [*(found := lg.metric.load(path)).quantities(), *found.tied()],
+    "corners.csv": lg.metrology.load_corners,
+    "compote": lg.metrology.load_compote,
+    "measured.json": lambda path: [*(found := lg.metrology.load(path)).quantities(), *found.tied()],
 }
 PACKAGE = str(Path(lg.__file__).parent)
 Tree = dict[str, bytes]

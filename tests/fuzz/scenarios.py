@@ -68,8 +68,8 @@ def _started(run: Callable[[Path], bytes], folder: Path, seconds: float | None) 
     """Exit code of a start in a folder, killed after a time of the processor [s] if one is given."""
 
     def child() -> None:
-        os.environ["lumigraphCACHE"] = str(folder / "cache")
-        os.environ.pop("lumigraphMEMORY", None)
+        os.environ["LUMIGRAPH_CACHE"] = str(folder / "cache")
+        os.environ.pop("LUMIGRAPH_MEMORY", None)
         atomic._SWEPT.clear()
         if seconds is not None:
             signal.signal(signal.SIGPROF, signal.SIG_DFL)
@@ -121,7 +121,7 @@ def cache(processes: int, count: int, *, seed: int = 0) -> tuple[int, list[str]]
             failures += _ended(pid)
 
         def next_start() -> None:
-            os.environ["lumigraphCACHE"] = place
+            os.environ["LUMIGRAPH_CACHE"] = place
             atomic._SWEPT.clear()
             for key in range(KEYS):
                 _look(key)
@@ -145,7 +145,7 @@ def _user(folder: Path, seed: float) -> int:
         return pid
     code = 70
     try:
-        os.environ["lumigraphCACHE"] = str(folder)
+        os.environ["LUMIGRAPH_CACHE"] = str(folder)
         atomic._SWEPT.clear()
         rng = random.Random(seed)
         while True:

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import scipy.io
 import tifffile
 import zarr
 from PIL import Image
@@ -205,6 +206,11 @@ def seeds() -> dict[str, tuple[list[Tree], Callable[[Tree], Tree] | None]]:
         "tiff": (tiffs, None),
         "png": (pngs, mend_png),
         "jpeg": ([{"a.jpg": jpeg(colour)}, {"a.jpg": jpeg(colour[..., 0])}], None),
+        "bmp": ([{"a.bmp": bmp(picture)} for picture in (grey, colour, grey > 99)], None),
+        "pnm": ([{"a.ppm": pnm(grey)}, {"a.ppm": pnm(wide)}, {"a.ppm": pnm(colour)}], None),
+        "mat": ([{"a.mat": content} for content in mats(views.data)], None),
+        "npy": ([{"a.npy": npy(views.data)}, {"a.npy": npy(np.asfortranarray(wide))}], None),
+        "npz": ([{"a.npz": npz(LF=views.data)}, {"a.npz": npz(a=wide)}], None),
         "zarr": (zarrs, None),
         "zarr.zip": ([{"a.zarr.zip": zipped(strip(tree, "a.zarr/"))} for tree in zarrs], None),
         "hdf5": (
@@ -246,17 +252,17 @@ def seeds() -> dict[str, tuple[list[Tree], Callable[[Tree], Tree] | None]]:
 
 def _metric(rng: np.random.Generator) -> list[Tree]:
     """A table of corners, a folder of COMPOTE's, and a measured camera."""
-    corners = lg.metric.Corners(
+    corners = lg.metrology.Corners(
         np.repeat([0, 1], 4), np.arange(8) % 5, rng.random((8, 2)), rng.random((8, 2)), np.arange(8) % 3
     )
-    pose = lg.metric.Pose(0, np.zeros(3), np.ones(3), np.eye(6), 0.1, 0.1)
-    camera = lg.metric.MetricCamera(0.05, 0.06, 1e-3, 0.06, 5e-6, (10.0, 12.0))
-    noise, board = Noise(np.ones(1), 0.1), lg.metric.Board((3, 4), 0.01)
-    measured = lg.metric.Measured(camera, np.eye(14), noise, board, (pose,), 0.1, 1, ("a note",))
+    pose = lg.metrology.Pose(0, np.zeros(3), np.ones(3), np.eye(6), 0.1, 0.1)
+    camera = lg.metrology.MetricCamera(0.05, 0.06, 1e-3, 0.06, 5e-6, (10.0, 12.0))
+    noise, board = Noise(np.ones(1), 0.1), lg.metrology.Board((3, 4), 0.01)
+    measured = lg.metrology.Measured(camera, np.eye(14), noise, board, (pose,), 0.1, 1, ("a note",))
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        lg.metric.save_corners(corners, folder / "corners.csv")
-        lg.metric.save(measured, folder / "measured.json")
+        lg.metrology.save_corners(corners, folder / "corners.csv")
+        lg.metrology.save(measured, folder / "measured.json")
         found = read_tree(folder)
     return [*({name: content} for name, content in found.items()), COMPOTE]
 
@@ -352,6 +358,50 @@ def heidelberg(rng: np.random.Generator) -> bytes:
             file["GT_DEPTH"] = rng.random((2, 2, 5, 6)).astype(np.float32)
             file.attrs["dH"] = 0.5
         return (Path(folder) / "a.h5").read_bytes()
+
+
+def bmp(picture: np.ndarray) -> bytes:
+    """A Windows bitmap."""
+    buffer = streams.BytesIO()
+    Image.fromarray(picture).save(buffer, "BMP")
+    return buffer.getvalue()
+
+
+def pnm(picture: np.ndarray) -> bytes:
+    """A PGM or PPM of 8 or 16 bits."""
+    kind, white = (6 if picture.ndim == 3 else 5), 255 if picture.dtype == np.uint8 else 65535
+    head = f"P{kind}\n# a note\n{picture.shape[1]} {picture.shape[0]}\n{white}\n".encode()
+    return head + picture.astype(">u2" if white > 255 else np.uint8).tobytes()
+
+
+def mats(data: np.ndarray) -> list[bytes]:
+    """MATLAB files of version 5, plain and packed, and of version 7.3."""
+    found = []
+    for packed in (False, True):
+        buffer = streams.BytesIO()
+        scipy.io.savemat(buffer, {"LF": data, "note": "text"}, do_compression=packed)
+        found.append(buffer.getvalue())
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.mat"
+        with h5py.File(path, "w", userblock_size=512) as file:
+            file["LF"] = data.T
+            file["LF"].attrs["MATLAB_class"] = np.bytes_("uint8")
+        content = path.read_bytes()
+    return [*found, b"MATLAB 7.3 MAT-file".ljust(512) + content[512:]]
+
+
+def npy(data: np.ndarray) -> bytes:
+    """An array as NumPy saves it."""
+    buffer = streams.BytesIO()
+    np.save(buffer, data)
+    return buffer.getvalue()
+
+
+def npz(**arrays: np.ndarray) -> bytes:
+    """Some arrays as NumPy packs them."""
+    buffer = streams.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return buffer.getvalue()
 
 
 def mend_png(tree: Tree) -> Tree:

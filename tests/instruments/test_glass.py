@@ -55,10 +55,13 @@ class Lens:
         return Rays(along, across, place, x, path + 1.0 + along * y + across * x)
 
 
-@pytest.fixture
-def known(monkeypatch):
-    monkeypatch.setenv("lumigraphCACHE", "off")
-    monkeypatch.setattr(glass, "Prescription", Lens)
+@pytest.fixture(scope="module")
+def known():
+    """Every prescription of this module is `Lens`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LUMIGRAPH_CACHE", "off")
+        patch.setattr(glass, "Prescription", Lens)
+        yield
     glass._glass.cache_clear()
     glass._first_order.cache_clear()
 
@@ -71,8 +74,18 @@ def single(path, **lens):
     )  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def unread(known, tmp_path_factory):
+    """Name of a prescription, for cameras that the whole module shares."""
+    path = tmp_path_factory.mktemp("glass") / "known.zmx"
+    path.write_text("not read")
+    return path
+
+
 @pytest.fixture
 def camera(known, tmp_path):
+    glass._glass.cache_clear()
+    glass._first_order.cache_clear()
     path = tmp_path / "known.zmx"
     path.write_text("not read")
     return single(path)
@@ -117,7 +130,7 @@ def centroid(raw):
     return np.array([raw.sum(1) @ y, raw.sum(0) @ x], float) / raw.sum() * 20e-6
 
 
-@pytest.mark.parametrize("dz", [0.0, 0.3])
+@pytest.mark.parametrize("dz", [0.0, pytest.param(0.3, marks=pytest.mark.long)])
 def test_a_point_stands_where_its_chief_ray_arrives(camera, dz):
     """Distorted, and as seen from the entrance pupil, 20 mm before the lens; rays of coma have a mean."""
     coarse = camera.replace(sensor={"pixel_pitch": "20 um", "shape": (21, 501)})
@@ -163,14 +176,25 @@ def test_a_slice_behind_glass_is_the_sum_of_its_points(camera):
     assert np.vdot(found, raw) == pytest.approx(np.vdot(picture, operator.adjoint(raw)), rel=1e-6)
 
 
-@pytest.fixture
-def plenoptic(camera):
+def plenoptic_behind(path):
     return lg.PlenopticCamera(
         wavelength="550 nm", object_distance=Z1,
-        main_lens={"focal_length": F, "diameter": D, "prescription": camera.main_lens.prescription},
+        main_lens={"focal_length": F, "diameter": D, "prescription": path},
         lenslets={"pitch": "240 um", "focal_length": "2.6 mm", "count": (31, 31)},
         sensor={"pixel_pitch": "12 um"},
     )  # fmt: skip
+
+
+@pytest.fixture
+def plenoptic(camera):
+    return plenoptic_behind(camera.main_lens.prescription)
+
+
+@pytest.fixture(scope="module")
+def strip(unread):
+    """Nine rows of lenslets across the whole field, and their white image."""
+    camera = plenoptic_behind(unread).replace(lenslets={"count": (9, 31)})
+    return camera, lg.simulate(camera, lg.targets.white(), lg.Incoherent(1e-2))
 
 
 @pytest.mark.long
@@ -195,9 +219,9 @@ def test_points_before_glass_have_derivatives_by_its_parts(camera):
         assert np.linalg.norm(found - expected) < most * np.linalg.norm(expected)
 
 
-def test_micro_images_stand_where_chief_rays_have_them(plenoptic):
+def test_micro_images_stand_where_chief_rays_have_them(strip):
     """In a white image by its own calibration: pitch of the exit pupil, and each centre by its own slope."""
-    white = lg.simulate(plenoptic, lg.targets.white(), lg.Incoherent(1e-2))
+    plenoptic, white = strip
     found, own = lg.calibrate(white), plenoptic.calibration
     assert own.lattice.pitch == pytest.approx(20 * (1 + 2.6e-3 / (Z2 - EXIT)), rel=1e-9)
     assert plenoptic.micro_image_pitch == pytest.approx(own.lattice.pitch * 12e-6)
@@ -205,11 +229,11 @@ def test_micro_images_stand_where_chief_rays_have_them(plenoptic):
     assert abs(20 * (1 + 2.6e-3 / Z2) / found.lattice.pitch - 1) > 3e-3
 
 
-def test_a_white_image_darkens_as_the_stop_narrows(plenoptic):
-    white = np.asarray(lg.simulate(plenoptic, lg.targets.white(), lg.Incoherent(1e-2)).data)
-    pitch, n = plenoptic.calibration.lattice.pitch, white.shape[0] // 2
+def test_a_white_image_darkens_as_the_stop_narrows(strip):
+    plenoptic, white = strip[0], np.asarray(strip[1].data)
+    pitch, (n, m) = plenoptic.calibration.lattice.pitch, (size // 2 for size in white.shape)
     across, box = round(13 * pitch), round(1.5 * pitch)
-    middle, side = (white[n - box : n + box, m - box : m + box].mean() for m in (n, n + across))
+    middle, side = (white[n - box : n + box, k - box : k + box].mean() for k in (m, m + across))
     field = 13 * 240e-6 / Z2
     assert side / middle == pytest.approx(1 - SHRINK * field**2, abs=8e-4)
 
@@ -343,7 +367,7 @@ def test_what_is_no_prescription_is_one_line(value, others, match):
 
 
 def test_without_optiland_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setenv("lumigraphCACHE", "off")
+    monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
     monkeypatch.setitem(sys.modules, "optiland", None)
     path = tmp_path / "lens.zmx"
     path.write_text("MODE SEQ\n")
@@ -399,14 +423,14 @@ def test_a_slice_of_a_plenoptic_camera_is_the_sum_of_its_points(plenoptic):
     assert np.linalg.norm(thin - expected) > 2e-2 * np.linalg.norm(expected)
 
 
-@pytest.mark.long  # a white image of 93 lenslets, 20 px each
+@pytest.mark.long  # a white image of 25 lenslets, 20 px each
 def test_micro_images_move_where_chief_rays_are_less_steep(plenoptic, monkeypatch):
     """Inwards at the side of the field, by the slope's difference from the exit pupil's middle times b."""
     here = sys.modules[__name__]
     monkeypatch.setattr(here, "LEAN", -200.0)
     monkeypatch.setattr(here, "D", 0.005)  # gaps between micro-images
     glass._glass.cache_clear()
-    one = plenoptic.replace(main_lens={"diameter": 0.005}, lenslets={"count": (3, 31)})
+    one = plenoptic.replace(main_lens={"diameter": 0.005}, lenslets={"count": (1, 25)})
     white = np.asarray(lg.simulate(one, lg.targets.white(), lg.Incoherent(1e-2)).data)
     lattice, b = one.calibration.lattice, 2.6e-3
     for j in (-12, 12):

@@ -32,15 +32,15 @@ def relative(found, truth):
 
 
 def test_an_object_that_was_moved_is_simulated_where_it_then_stands():
-    shifts = [(0.0, 0.0), (31 * um, -17 * um)]
-    operator = lg.joint_operator(CAMERA, shifts=shifts)
-    assert operator.object_grid.size[0] > 5 * SIZE
+    shifts, small = [(0.0, 0.0), (31 * um, -17 * um)], CAMERA.replace(lenslets={"count": (3, 3)})
+    operator = lg.joint_operator(small, shifts=shifts, accuracy=1e-2)
+    assert operator.object_grid.size[0] > 3 * SIZE
     parts = operator.parted(operator.forward(blob_on(operator.object_grid, 20 * um, 35 * um)))
     for found, (dy, dx) in zip(parts, shifts, strict=True):
         there = Grid((31, 31), (3.5 * um, 3.5 * um), (20 * um + dy, 35 * um + dx))
         picture = blob_on(there, 20 * um + dy, 35 * um + dx)
-        truth = lg.simulate(CAMERA, lg.Scene([lg.Slice(picture, there)])).data
-        assert relative(found, truth) < 3e-3  # the wrong sign of a shift: 1.4
+        truth = lg.simulate(small, lg.Scene([lg.Slice(picture, there)]), lg.Incoherent(1e-2)).data
+        assert relative(found, truth) < 2e-2  # the wrong sign of a shift: 1.4
 
 
 def test_arrays_that_were_moved_see_one_object():
@@ -62,21 +62,21 @@ def test_a_plain_picture_stands_beside_a_light_field():
         main_lens={"focal_length": 100 * mm, "diameter": 8 * mm},
         sensor={"pixel_pitch": 5 * um, "shape": (101, 101)},
     )
-    depths = (-1 * mm, 1 * mm)
-    operator = lg.joint_operator([CAMERA, plain], depths)
+    depths, small = (-1 * mm, 1 * mm), CAMERA.replace(lenslets={"count": (3, 3)})
+    operator = lg.joint_operator([small, plain], depths, accuracy=1e-2)
     assert operator.depths == depths
     grid = operator.object_grid
-    assert grid.pitch[0] == pytest.approx(min(CAMERA.operator_grid().pitch[0], plain.object_grid.pitch[0]))
+    assert grid.pitch[0] == pytest.approx(min(small.operator_grid().pitch[0], plain.object_grid.pitch[0]))
     volume = np.zeros(operator.shape[1], np.float32)
     volume[1] = blob_on(grid, 20 * um, 35 * um)
     seen, picture = operator.parted(operator.forward(volume))
     there = Grid((31, 31), (3.5 * um, 3.5 * um), (20 * um, 35 * um))
     light = blob_on(there, 20 * um, 35 * um)
-    for found, camera, dz in ((seen, CAMERA, 1 * mm), (picture, plain, 0.0)):
-        truth = lg.simulate(camera, lg.Scene([lg.Slice(light, there, dz)])).data
-        assert relative(found, truth) < 4e-3
+    for found, camera, dz in ((seen, small, 1 * mm), (picture, plain, 0.0)):
+        truth = lg.simulate(camera, lg.Scene([lg.Slice(light, there, dz)]), lg.Incoherent(1e-2)).data
+        assert relative(found, truth) < 2e-2
     with pytest.raises(lg.GeometryError, match=r"focused at 0\.2 to 0\.201 m. Give depths"):
-        lg.joint_operator([CAMERA, plain])
+        lg.joint_operator([small, plain])
 
 
 def test_a_microscope_sees_an_object_that_was_moved():

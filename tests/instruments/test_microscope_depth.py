@@ -27,7 +27,7 @@ def views_of(scope, dz):
     return lg.decode(np.maximum(operator.forward(scene), 0), scope.calibration)
 
 
-@pytest.mark.parametrize("dz", [-80e-6, 80e-6])
+@pytest.mark.parametrize("dz", [-80e-6, pytest.param(80e-6, marks=pytest.mark.long)])
 def test_the_depth_of_a_textured_plane_comes_out_in_metres_positive_farther(scope, dz):
     views = views_of(scope, dz)
     found = defocus(epi(views), views, scope.depth_per_alpha)

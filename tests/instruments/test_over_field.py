@@ -143,3 +143,26 @@ def test_a_wavelength_beyond_the_table_is_refused():
     )
     with pytest.raises(GeometryError, match=r"wavelength is 633 nm .* from 500 to 600 nm"):
         lg.simulate(camera, lg.targets.points([(0.0, 0.0)]))
+
+
+@pytest.mark.parametrize(
+    ("unit", "path"),
+    [("waves", 550e-9), ("nm", 1e-9), ("um", 1e-6), ("m", 1.0)],
+    ids=["waves", "nm", "um", "m"],
+)
+def test_one_table_in_each_unit_is_described_in_waves_and_aberrates_alike(unit, path):
+    """A quarter of a wave at 550 nm."""
+    camera = with_table(unit=unit, terms={8: [0, 0.25 * 550e-9 / path]}).replace(wavelength="550 nm")
+    rows = {row.name: row.value for row in camera.quantities()}
+    assert rows["Noll 8, most over the field"] == pytest.approx(0.25, rel=1e-9)
+    assert camera.main_lens.over_field.aberrations.at(0.0, math.tan(0.1), 550e-9)[8] == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("unit", ["waves", "nm", "um", "m"])
+@pytest.mark.parametrize("size", [1e-9, 1.0, 100.0])
+def test_what_no_round_lens_has_is_refused_beside_terms_of_any_size_and_unit(unit, size):
+    """By one part in a million of the largest term: 2e-6 is refused, 0.5e-6 is rounding."""
+    allowed = with_table(unit=unit, terms={8: [0.5e-6 * size, size]})
+    assert allowed.main_lens.over_field.terms[8][1] == size
+    with pytest.raises(GeometryError, match=r"Noll term 8 is .* on the axis, where no round lens has it"):
+        with_table(unit=unit, terms={8: [2e-6 * size, size]})

@@ -10,8 +10,9 @@ from fuzz import run, seeds
 READERS = (
     "tiff", "png", "jpeg", "zarr", "zarr.zip", "hdf5", "pfm", "ply", "lytro", "lytro raw", "lytro json",
     "toml", "xml", "ini", "views", "eslf", "camera", "checkpoint", "metric",
+    "bmp", "pnm", "mat", "npy", "npz",
 )  # fmt: skip
-SEED = int(os.environ.get("lumigraphFUZZ_SEED", f"{datetime.now(UTC):%Y%m%d}"))
+SEED = int(os.environ.get("LUMIGRAPH_FUZZ_SEED", f"{datetime.now(UTC):%Y%m%d}"))
 """Other mutants every day, the same ones for all workers; printed, so that a failure can be made again."""
 
 

@@ -73,7 +73,7 @@ def test_notes_beside_views_or_in_a_store_are_not_removed(tmp_path, name):
     views = LightField(np.ones((2, 2, 3, 4), np.uint8), Grid((2, 2), 1e-3), Grid((3, 4), 1e-4), 0.01)
     for _ in range(2):
         io.save(views, tmp_path / name)
-    (tmp_path / name / ".hidden").write_text("by the system")
+    (tmp_path / name / ".DS_Store").write_text("by the system")
     (tmp_path / name / "notes.txt").write_text("mine")
     with pytest.raises(FormatError, match=r"would remove notes\.txt, which it holds too"):
         io.save(views, tmp_path / name)

@@ -170,12 +170,13 @@ def test_a_folder_and_a_pipe_are_not_files(tmp_path):
 
 
 def test_an_unknown_extension_lists_the_known_ones(tmp_path):
-    (tmp_path / "a.bmp").write_bytes(b"BM")
+    (tmp_path / "a.cr2").write_bytes(b"BM")
     for act in (io.open, lambda path: io.save(np.ones((2, 2)), path)):
         with pytest.raises(
-            FormatError, match=r"Known extensions are .gif, .h5, .hdf5, .ini, .jpeg, .jpg, .json, .lfp"
+            FormatError,
+            match=r"Known extensions are .bmp, .eslf.jpeg, .eslf.jpg, .eslf.png, .gif, .h5, .hdf5",
         ):
-            act(tmp_path / "a.bmp")
+            act(tmp_path / "a.cr2")
 
 
 @pytest.mark.parametrize(
@@ -290,7 +291,7 @@ LIGHT = LightField(np.ones((2, 2, 2, 2)), Grid.square(2, 1.0), Grid.square(2, 1.
         (
             LIGHT,
             "a.png",
-            "wrong extension for this result, a LightField. Use one of _eslf.png, .zarr",
+            "wrong extension for this result, a LightField. Use one of _eslf.png, .eslf.png, .zarr",
         ),
         (np.ones((2, 2)), "a.toml", "Use one of .tif, .tiff, .png, .zarr, .zarr.zip"),
         ([np.ones((2, 2))], "a.png", "Use one of .tif, .tiff"),

@@ -227,3 +227,35 @@ def test_values_that_do_not_fit_are_not_packed():
         bits.pack(np.array([4096]), 12, "big")
     with pytest.raises(FormatError, match="4 pixels of 10 bits need 5 bytes but there are 4"):
         bits.unpack(bytes(4), 4, 10, "little")
+
+
+def padded(metadata: dict, size: int) -> bytes:
+    """Metadata as JSON of so many bytes: blanks mean nothing in it."""
+    return json.dumps(metadata).encode().ljust(size)
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_metadata_in_a_container_is_read_up_to_8_mib_and_no_byte_more(tmp_path, more):
+    limit, path = 8 << 20, tmp_path / "a.lfp"
+    metadata = seeds.frame_metadata((16, 12), 16, "little", "r", illum=False)
+    known, packed = padded(metadata, limit + more), bytes(16 * 12 * 2)
+    frame = {"frame": {"metadataRef": seeds.reference(known), "imageRef": seeds.reference(packed)}}
+    path.write_bytes(seeds.container({"picture": {"frameArray": [frame]}}, [known, packed]))
+    if more:
+        with pytest.raises(
+            FormatError, match=f"its metadata has {limit + 1} bytes, at most {limit} are read"
+        ):
+            io.open(path)
+    else:
+        assert io.open(path).data.shape == (16, 12)
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_metadata_beside_a_frame_is_read_up_to_8_mib_and_no_byte_more(tmp_path, more):
+    limit, path = 8 << 20, tmp_path / "b.json"
+    path.write_bytes(padded(seeds.frame_metadata((16, 12), 16, "little", "r", illum=True), limit + more))
+    if more:
+        with pytest.raises(FormatError, match=f"has {limit + 1} bytes, too many for metadata"):
+            io.open(path)
+    else:
+        assert isinstance(io.open(path), lg.Calibration)

@@ -119,7 +119,8 @@ def test_stanford_names_tell_the_spacing_of_the_cameras(tmp_path):
             io.save(np.full((4, 5, 3), 10 * row + column, np.uint8), tmp_path / name)
     found = io.open(tmp_path)
     assert found.aperture.pitch == pytest.approx((30, 40))
-    np.testing.assert_array_equal(found.data[..., 0, 0, 0], [[21, 20], [11, 10], [1, 0]])
+    # y grows with the rows, x falls with the columns: column 0 stands farthest right.
+    np.testing.assert_array_equal(found.data[..., 0, 0, 0], [[20, 21], [10, 11], [0, 1]])
 
 
 def test_a_view_that_is_missing_or_different_is_named(tmp_path):
@@ -217,7 +218,7 @@ def test_a_pfm_survives_and_stands_bottom_up_in_the_file(tmp_path, rng, shape):
         (b"Pf\n2 x\n-1\n" + bytes(16), "damaged PFM: its header is"),
         (b"Pf\n2 2\n0\n" + bytes(16), "damaged PFM: its scale is '0'"),
         (b"Pf\n99999999 99999999\n-1\n" + bytes(16), "declares 99999999 x 99999999"),
-        (b"P5\n2 2\n255\n" + bytes(4), "is not a PFM file"),
+        (b"P5\n2 2\n255\n" + bytes(4), "is a PNM file, not PFM"),
     ],
 )
 def test_damaged_pfms_are_named(tmp_path, content, message):

@@ -35,7 +35,7 @@ def camera():
 @pytest.fixture(scope="module")
 def charts(camera):
     rng = np.random.default_rng(5)
-    return lg.metric.simulate_charts(camera, [0.0], name="small", rng=rng, exposures=3)
+    return lg.metrology.simulate_charts(camera, [0.0], name="small", rng=rng, exposures=3)
 
 
 @pytest.fixture(scope="module")
@@ -53,12 +53,12 @@ def exposed(light, count, reference=1.0):
 @pytest.fixture(scope="module")
 def drawn(light):
     """Two white images and one dark."""
-    return lg.metric.Charts("drawn", exposed(light, 2)[:], exposed(0 * light, 1)[:])
+    return lg.metrology.Charts("drawn", exposed(light, 2)[:], exposed(0 * light, 1)[:])
 
 
 @pytest.fixture(scope="module")
 def sheet(charts):
-    return lg.metric.datasheet(charts)
+    return lg.metrology.datasheet(charts)
 
 
 @SIMULATES
@@ -94,8 +94,8 @@ def test_half_contrast_is_that_of_a_lenslet_and_the_main_lens(sheet, camera):
 
 @SIMULATES
 def test_files_tell_what_the_pictures_told(sheet, charts, tmp_path):
-    lg.metric.save_charts(charts, tmp_path)
-    again = lg.metric.datasheet(lg.metric.read_charts(tmp_path))
+    lg.metrology.save_charts(charts, tmp_path)
+    again = lg.metrology.datasheet(lg.metrology.read_charts(tmp_path))
     told = {q.name: q for q in again.quantities()}
     assert set(told) == {q.name for q in sheet.quantities()}
     for q in sheet.quantities():
@@ -103,7 +103,7 @@ def test_files_tell_what_the_pictures_told(sheet, charts, tmp_path):
 
 
 def test_a_white_image_alone_tells_the_lattice_and_why_the_rest_is_missing(drawn):
-    sheet = lg.metric.datasheet(replace(drawn, whites=drawn.whites[:1]))
+    sheet = lg.metrology.datasheet(replace(drawn, whites=drawn.whites[:1]))
     found = {one.quantity.name: one for one in sheet.entries}
     assert found["pitch_px"].value == pytest.approx(15.3, abs=2e-3)
     assert found["micro_image_width_px"].value == pytest.approx(0.85 * 15.3, rel=0.02)
@@ -116,7 +116,7 @@ def test_a_white_image_alone_tells_the_lattice_and_why_the_rest_is_missing(drawn
 @SIMULATES
 def test_a_scene_is_shown_and_its_depth_is_in_metres_of_a_camera_file(sheet, charts, tmp_path, capsys):
     scene = charts.boards[0].textures[0]
-    lg.metric.save_charts(replace(charts, boards=(), flats=(), scenes=(scene,)), tmp_path / "a")
+    lg.metrology.save_charts(replace(charts, boards=(), flats=(), scenes=(scene,)), tmp_path / "a")
     assert main(["datasheet", str(tmp_path / "a"), "-o", str(tmp_path / "a.html"), "--json"]) == 0
     rows = {row["name"]: row for row in json.loads(capsys.readouterr().out)["entries"]}
     assert rows["depth_noise_of_scene_1_in_metres"]["unit"] == "m"
@@ -131,12 +131,12 @@ def test_a_scene_is_shown_and_its_depth_is_in_metres_of_a_camera_file(sheet, cha
 
 def test_a_white_image_in_the_place_of_the_dark_one_is_refused(light, drawn):
     with pytest.raises(CalibrationError, match="no brighter than the dark image"):
-        lg.metric.datasheet(replace(drawn, darks=exposed(1.1 * light, 1)[:]))
+        lg.metrology.datasheet(replace(drawn, darks=exposed(1.1 * light, 1)[:]))
 
 
 def test_snr_is_that_of_the_electrons(drawn):
     """0.8 of a full well of 8000 is 6400 electrons: 80, less what darker pixels have."""
-    found = lg.metric.datasheet(drawn)["snr_of_pixels"]
+    found = lg.metrology.datasheet(drawn)["snr_of_pixels"]
     assert found.value == pytest.approx(80, rel=0.03)
 
 
@@ -155,7 +155,7 @@ def test_snr_is_that_of_the_electrons(drawn):
     ],
 )
 def test_values_have_the_digits_of_their_intervals(value, unit, interval, shown):
-    entry = lg.metric.SheetEntry("", lg.metric.sheet.Quantity("a", value, unit, interval), "")
+    entry = lg.metrology.SheetEntry("", lg.metrology.sheet.Quantity("a", value, unit, interval), "")
     assert entry.text == shown
 
 
@@ -228,16 +228,30 @@ def test_pieces_of_the_field_that_some_exposure_does_not_know_count_in_none():
 @pytest.fixture(scope="module")
 def of_few_and_many(light, drawn):
     """Sheets of two and of eight white images."""
-    return [lg.metric.datasheet(replace(drawn, whites=exposed(light, count))) for count in (2, 8)]
+    return [lg.metrology.datasheet(replace(drawn, whites=exposed(light, count))) for count in (2, 8)]
 
 
 def test_the_residual_of_several_white_images_holds_no_noise(light, drawn, of_few_and_many):
     """Discs drawn on pixels are 2.3e-3 px off the lattice without noise, 4e-3 px with that of one image."""
     clean, _ = residual([places(light, calibrate(RawImage(light)))])
-    alone = lg.metric.datasheet(replace(drawn, whites=drawn.whites[:1]))["residual_px"]
+    alone = lg.metrology.datasheet(replace(drawn, whites=drawn.whites[:1]))["residual_px"]
     many = of_few_and_many[1]["residual_px"]
     assert many.interval[0] < clean < many.interval[1]
     assert many.interval[1] < alone.interval[0]
+
+
+def test_the_sheet_says_whether_noise_is_in_the_residual(drawn, of_few_and_many):
+    alone = lg.metrology.datasheet(replace(drawn, whites=drawn.whites[:1]))
+    how = [
+        next(one.how for one in sheet.entries if one.quantity.name == "residual_px")
+        for sheet in (alone, *of_few_and_many)
+    ]
+    assert how[0] == "rms of what phases are off the lattice; noise is in it"
+    assert (
+        how[1]
+        == how[2]
+        == ("rms of what phases are off the lattice; noise, by two halves of the exposures, is not in it")
+    )
 
 
 @pytest.mark.parametrize("name", ["snr_of_pixels", "snr_of_picture"])
@@ -269,16 +283,16 @@ def test_exposures_of_several_sizes_have_no_mean():
 
 
 def test_a_folder_holds_several_exposures_of_a_chart(tmp_path, drawn):
-    seen = lg.metric.ChartExposures(drawn.whites, drawn.darks, 5e-3)
-    lg.metric.save_charts(replace(drawn, boards=(seen,)), tmp_path)
-    read = lg.metric.read_charts(tmp_path).boards[0]
+    seen = lg.metrology.ChartExposures(drawn.whites, drawn.darks, 5e-3)
+    lg.metrology.save_charts(replace(drawn, boards=(seen,)), tmp_path)
+    read = lg.metrology.read_charts(tmp_path).boards[0]
     assert isinstance(read.boards, FileExposures)
     assert [len(read.boards), len(read.textures), read.depth] == [2, 1, 5e-3]
     assert np.array_equal(read.boards[1].data, drawn.whites[1].data)
     text = (tmp_path / "charts.toml").read_text()
     assert 'board = ["board-1-1.tiff", "board-1-2.tiff"]' in text
     (tmp_path / "charts.toml").write_text(text.replace('["texture-1-1.tiff"]', '"texture-1-1.tiff"'))
-    assert len(lg.metric.read_charts(tmp_path).boards[0].textures) == 1
+    assert len(lg.metrology.read_charts(tmp_path).boards[0].textures) == 1
 
 
 @pytest.mark.parametrize(("side", "count"), [(800, 16), (3157, 4), (9000, 2)])
@@ -288,12 +302,12 @@ def test_large_sensors_are_exposed_less_often(camera, side, count):
 
 def test_simulated_charts_have_one_exposure_or_more(camera):
     with pytest.raises(GeometryError, match="exposures is 0 but must be a whole number of at least 1"):
-        lg.metric.simulate_charts(camera, [0.0], exposures=0)
+        lg.metrology.simulate_charts(camera, [0.0], exposures=0)
 
 
 def test_two_cameras_stand_side_by_side(drawn, tmp_path, capsys):
-    lg.metric.save_charts(drawn, tmp_path / "a")
-    lg.metric.save_charts(replace(drawn, whites=drawn.whites[:1]), tmp_path / "b")
+    lg.metrology.save_charts(drawn, tmp_path / "a")
+    lg.metrology.save_charts(replace(drawn, whites=drawn.whites[:1]), tmp_path / "b")
     page = tmp_path / "both.html"
     assert main(["datasheet", str(tmp_path / "a"), str(tmp_path / "b"), "-o", str(page), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -323,14 +337,14 @@ def test_two_cameras_stand_side_by_side(drawn, tmp_path, capsys):
 def test_a_wrong_list_of_charts_is_refused(tmp_path, text, said):
     (tmp_path / "charts.toml").write_text(text)
     with pytest.raises(FormatError, match=said):
-        lg.metric.read_charts(tmp_path)
+        lg.metrology.read_charts(tmp_path)
 
 
 def test_a_folder_without_white_images_is_refused(tmp_path):
     with pytest.raises(FormatError, match="nor a picture with 'white' in its name among 0 pictures"):
-        lg.metric.read_charts(tmp_path)
+        lg.metrology.read_charts(tmp_path)
     with pytest.raises(FormatError, match="is no folder"):
-        lg.metric.read_charts(tmp_path / "none")
+        lg.metrology.read_charts(tmp_path / "none")
 
 
 def test_only_plenoptic_cameras_have_a_sheet():
@@ -342,6 +356,6 @@ def test_only_plenoptic_cameras_have_a_sheet():
     "name", ["thesis-plenoptic-1", "thesis-plenoptic-2-m030", "galilean", "multi-focus-hex"]
 )
 def test_charts_stand_on_either_side_of_the_focus(name):
-    depths = usual_depths(check_camera(lg.metric.charts.load_camera(name)))
+    depths = usual_depths(check_camera(lg.metrology.charts.load_camera(name)))
     assert min(depths) < 0 < max(depths)
     assert 0.0 in depths

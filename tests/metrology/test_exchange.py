@@ -13,7 +13,7 @@ from lumigraph.metrology.boards import compote
 
 RNG = np.random.default_rng(18)
 SHAPE = (600, 801)
-CAMERA = lg.metric.MetricCamera(
+CAMERA = lg.metrology.MetricCamera(
     50e-3,
     56e-3,
     0.4e-3,
@@ -111,7 +111,7 @@ def test_compotes_array_leans_as_the_cameras(real_one):
     camera, found = CAMERA, compote.intrinsics_of(CAMERA, calibration(HEX), distance=0.4)[0]
     if real_one:
         path = real("compote_r12a", "intrinsics.json")
-        camera, found = lg.metric.load_camera(path)[0], json.loads(path.read_text())
+        camera, found = lg.metrology.load_camera(path)[0], json.loads(path.read_text())
     x, y, z = lenslets_of_compote(found).T
     away = camera.separation * 1e3 + np.stack([-y, -x], 1) @ camera.tilt  # its axes run against the picture's
     assert np.allclose(-z, away, atol=1e-9)
@@ -131,7 +131,7 @@ def test_compotes_lenslets_shine_onto_their_micro_images():
 
 def test_the_real_camera_of_compote_is_read_as_it_sees():
     path = real("compote_r12a", "intrinsics.json")
-    camera, found = lg.metric.load_camera(path)
+    camera, found = lg.metrology.load_camera(path)
     assert camera.focal_length == pytest.approx(49.885285868753407e-3)
     assert (found.lattice.layout, found.lattice.kinds, found.shape) == ("hex", 3, (3068, 4080))
     assert off_compote(camera, json.loads(path.read_text()), 0.45) < 0.5  # the array's tilt, at the corners
@@ -139,8 +139,8 @@ def test_the_real_camera_of_compote_is_read_as_it_sees():
 
 
 def test_compotes_micro_images_are_of_the_kind_that_its_observations_say():
-    _, found = lg.metric.load_camera(real("compote_r12a", "intrinsics.json"))
-    seen, _, _ = lg.metric.load_compote(real("compote_r12a", "bap.csv").parent)
+    _, found = lg.metrology.load_camera(real("compote_r12a", "intrinsics.json"))
+    seen, _, _ = lg.metrology.load_compote(real("compote_r12a", "bap.csv").parent)
     index = found.index(*seen.center.T)
     assert np.abs(found.position(np.stack(index, -1)) - seen.center).max() < 0.5
     assert np.array_equal(found.lattice.kind(*index), seen.kind)
@@ -150,10 +150,10 @@ def test_compotes_micro_images_are_of_the_kind_that_its_observations_say():
 def test_a_camera_comes_back_from_compote(tmp_path, lattice):
     straight = replace(lattice, basis=compote_basis(lattice))
     camera = replace(CAMERA, gains=(1.0,) * lattice.kinds)
-    lg.metric.save_camera(
+    lg.metrology.save_camera(
         camera, calibration(straight), tmp_path / "a.json", "compote", distance=0.4, f_number=4.0
     )
-    again, found = lg.metric.load_camera(tmp_path / "a.json")
+    again, found = lg.metrology.load_camera(tmp_path / "a.json")
     assert np.allclose(again.numbers, camera.numbers, rtol=1e-9, atol=1e-12)
     assert (found.shape, found.lattice.layout, found.lattice.kinds) == (SHAPE, lattice.layout, lattice.kinds)
     centers = straight.centers((0, 599), (0, 800))
@@ -172,7 +172,7 @@ def compote_basis(lattice):
 
 def test_what_compote_cannot_hold_is_named(tmp_path):
     odd = replace(CAMERA, gains=(0.99, 1.0, 1.01))
-    notes = lg.metric.save_camera(odd, calibration(HEX), tmp_path / "a.json", "compote", distance=0.4)
+    notes = lg.metrology.save_camera(odd, calibration(HEX), tmp_path / "a.json", "compote", distance=0.4)
     told = " / ".join(notes)
     for word in ("uncertainties", "focal lengths", "dist_focus", "f-number", "gains", "sheared by"):
         assert word in told
@@ -180,19 +180,19 @@ def test_what_compote_cannot_hold_is_named(tmp_path):
     with pytest.raises(
         FormatError, match="no plane has its image in the lenslets, 49 mm from a lens of 50 mm"
     ):
-        lg.metric.save_camera(near, calibration(HEX), tmp_path / "a.json", "compote")
+        lg.metrology.save_camera(near, calibration(HEX), tmp_path / "a.json", "compote")
 
 
 def test_cameras_that_compote_cannot_mean_are_refused(tmp_path):
     path = tmp_path / "a.json"
     with pytest.raises(FormatError, match="distance is 50 mm but must be beyond f, 50 mm"):
-        lg.metric.save_camera(CAMERA, calibration(HEX), path, "compote", distance=0.05)
-    lg.metric.save_camera(CAMERA, calibration(HEX), path, "compote", distance=0.4)
+        lg.metrology.save_camera(CAMERA, calibration(HEX), path, "compote", distance=0.05)
+    lg.metrology.save_camera(CAMERA, calibration(HEX), path, "compote", distance=0.4)
     found = json.loads(path.read_text())
     found["mla"]["mesh"]["pitch"] = [[p * CAMERA.pixel_pitch * 1e3 for p in found["mia"]["mesh"]["pitch"][0]]]
     path.write_text(json.dumps(found))
     with pytest.raises(FormatError, match=r"mia.mesh.pitch is 1 of mla.mesh.pitch but must be more"):
-        lg.metric.load_camera(path)
+        lg.metrology.load_camera(path)
 
 
 FLAT = replace(CAMERA, tilt=(0.0, 0.0), radial=(0.0,) * 3, tangential=(0.0, 0.0), gains=(1.0,))
@@ -205,7 +205,7 @@ def rays_of(found, index):
 
 def test_rays_of_lftoolbox_are_those_of_the_camera(tmp_path):
     square = calibration(SQUARE)
-    lg.metric.save_camera(FLAT, square, tmp_path / "a.json", "lftoolbox", views=9)
+    lg.metrology.save_camera(FLAT, square, tmp_path / "a.json", "lftoolbox", views=9)
     found = json.loads((tmp_path / "a.json").read_text())
     index = RNG.integers(1, 10, (200, 4)) + np.array([0, 0, 6, 3])
     first = square.indices.min(0)
@@ -221,7 +221,7 @@ def test_rays_of_lftoolbox_are_those_of_the_camera(tmp_path):
 
 def test_distortion_of_lftoolbox_turns_rays_to_where_points_are(tmp_path):
     camera = replace(FLAT, radial=(0.3, -2.0, 5.0), tangential=(2e-3, -3e-3))
-    lg.metric.save_camera(camera, calibration(SQUARE), tmp_path / "a.json", "lftoolbox", views=9)
+    lg.metrology.save_camera(camera, calibration(SQUARE), tmp_path / "a.json", "lftoolbox", views=9)
     k1, k2, k3, *middle = json.loads((tmp_path / "a.json").read_text())["EstCamDistortionV"]
     seen = RNG.uniform(-0.04, 0.04, (50, 2))
     from_middle = seen - middle
@@ -229,7 +229,7 @@ def test_distortion_of_lftoolbox_turns_rays_to_where_points_are(tmp_path):
     true = from_middle * (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3) + middle
     for sign, most in ((1, 1e-5), (-1, np.inf)):  # the distortion's middle is held to first order
         tangential = sign * np.array(camera.tangential)
-        back = lg.metric.geometry.distorted(true[:, ::-1], np.array(camera.radial), tangential)
+        back = lg.metrology.geometry.distorted(true[:, ::-1], np.array(camera.radial), tangential)
         assert np.abs(back[:, ::-1] - seen).max() < most
     assert np.abs(back[:, ::-1] - seen).max() > 3e-5
     assert np.abs(true - seen).max() > 2e-5
@@ -238,8 +238,8 @@ def test_distortion_of_lftoolbox_turns_rays_to_where_points_are(tmp_path):
 def test_a_camera_comes_back_from_lftoolbox(tmp_path):
     camera = replace(FLAT, radial=(0.3, -2.0, 5.0), tangential=(2e-3, -3e-3))
     straight = replace(SQUARE, basis=compote_basis(SQUARE))
-    notes = lg.metric.save_camera(camera, calibration(straight), tmp_path / "a.json", "lftoolbox", views=9)
-    again, found = lg.metric.load_camera(tmp_path / "a.json")
+    notes = lg.metrology.save_camera(camera, calibration(straight), tmp_path / "a.json", "lftoolbox", views=9)
+    again, found = lg.metrology.load_camera(tmp_path / "a.json")
     assert np.allclose(again.numbers, camera.numbers, rtol=1e-9, atol=1e-10)
     assert found.shape == SHAPE
     assert np.allclose(
@@ -251,16 +251,16 @@ def test_a_camera_comes_back_from_lftoolbox(tmp_path):
 def test_what_lftoolbox_cannot_hold_is_named(tmp_path):
     path = tmp_path / "a.json"
     odd = replace(CAMERA, radial=(0.0, 0.0, 0.0))
-    notes = lg.metric.save_camera(odd, calibration(SQUARE), path, "lftoolbox", views=9)
+    notes = lg.metrology.save_camera(odd, calibration(SQUARE), path, "lftoolbox", views=9)
     told = " / ".join(notes)
     for word in ("uncertainties", "tangential", "tilt (0.6, -0.9 mrad)", "3 kinds", "shear"):
         assert word in told
     with pytest.raises(FormatError, match="the lattice is hexagonal"):
-        lg.metric.save_camera(CAMERA, calibration(HEX), path, "lftoolbox", views=9)
+        lg.metrology.save_camera(CAMERA, calibration(HEX), path, "lftoolbox", views=9)
     with pytest.raises(FormatError, match="Give views=9"):
-        lg.metric.save_camera(FLAT, calibration(SQUARE), path, "lftoolbox")
+        lg.metrology.save_camera(FLAT, calibration(SQUARE), path, "lftoolbox")
     with pytest.raises(FormatError, match="form is 'ini' but must be one of compote, lftoolbox"):
-        lg.metric.save_camera(FLAT, calibration(SQUARE), path, "ini")
+        lg.metrology.save_camera(FLAT, calibration(SQUARE), path, "ini")
 
 
 @pytest.mark.parametrize(
@@ -275,10 +275,10 @@ def test_what_lftoolbox_cannot_hold_is_named(tmp_path):
 )
 def test_damaged_files_of_lftoolbox_are_named(tmp_path, key, value, message):
     path = tmp_path / "a.json"
-    lg.metric.save_camera(FLAT, calibration(SQUARE), path, "lftoolbox", views=9)
+    lg.metrology.save_camera(FLAT, calibration(SQUARE), path, "lftoolbox", views=9)
     path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
     with pytest.raises(FormatError) as raised:
-        lg.metric.load_camera(path)
+        lg.metrology.load_camera(path)
     assert message in str(raised.value)
 
 
@@ -287,4 +287,4 @@ def test_another_json_file_is_refused(tmp_path):
     with pytest.raises(
         FormatError, match=r"neither COMPOTE's intrinsics nor LFToolbox' CalInfo: it has the keys b"
     ):
-        lg.metric.load_camera(tmp_path / "a.json")
+        lg.metrology.load_camera(tmp_path / "a.json")

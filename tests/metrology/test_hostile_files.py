@@ -38,7 +38,7 @@ def test_a_measured_camera_of_the_wrong_structure_is_refused(files, place, wrong
     inside[place[-1]] = wrong
     (files / "measured.json").write_text(json.dumps(found))
     with pytest.raises(lg.FormatError, match=match):
-        lg.metric.load(files / "measured.json")
+        lg.metrology.load(files / "measured.json")
 
 
 @pytest.mark.parametrize(
@@ -57,16 +57,16 @@ def test_a_table_of_corners_that_would_be_read_wrongly_is_refused(files, old, ne
         text = "\n".join(line + ",0" if k else line for k, line in enumerate(text.splitlines())) + "\n"
     (files / "corners.csv").write_text(text)
     with pytest.raises(lg.FormatError, match=match):
-        lg.metric.load_corners(files / "corners.csv")
+        lg.metrology.load_corners(files / "corners.csv")
 
 
 @pytest.mark.parametrize("name", [path.removeprefix("compote/") for path in texts.COMPOTE])
 def test_a_link_in_a_folder_of_compotes_is_not_followed(files, name):
-    assert len(lg.metric.load_compote(files / "compote")[0]) == 3
+    assert len(lg.metrology.load_compote(files / "compote")[0]) == 3
     (files / "compote" / name).rename(files / "elsewhere")
     (files / "compote" / name).symlink_to(files / "elsewhere")
     with pytest.raises(lg.FormatError, match="is a link, which is not followed"):
-        lg.metric.load_compote(files / "compote")
+        lg.metrology.load_compote(files / "compote")
 
 
 @pytest.mark.parametrize("wrong", ["1e308", "nan", "-1e7"])
@@ -74,5 +74,5 @@ def test_centres_beyond_every_picture_are_refused_and_nothing_is_printed(files, 
     path = files / "compote" / "centers.csv"
     path.write_text(path.read_text().replace("1,0,30,10", f"1,0,{wrong},10"))
     with pytest.raises(lg.FormatError, match=r"centres beyond 1e\+06 px"):
-        lg.metric.load_compote(files / "compote")
+        lg.metrology.load_compote(files / "compote")
     assert capfd.readouterr() == ("", "")

@@ -21,7 +21,7 @@ def seen() -> Corners:
 
 
 @pytest.fixture(scope="module")
-def measured(seen: Corners) -> lg.metric.Measured:
+def measured(seen: Corners) -> lg.metrology.Measured:
     return board(seen, BOARD, NOMINAL)
 
 
@@ -73,7 +73,7 @@ def test_white_noise_comes_out_of_noise_that_corners_share() -> None:
     assert found.shared == pytest.approx(0.5, rel=0.1)
 
 
-def test_a_drawn_camera_comes_back_within_its_intervals(measured: lg.metric.Measured) -> None:
+def test_a_drawn_camera_comes_back_within_its_intervals(measured: lg.metrology.Measured) -> None:
     off = (measured.camera.numbers - CAMERA.numbers) / measured.errors
     assert np.abs(off[:8]).max() < 4
     assert measured.residual_px == pytest.approx(0.3, rel=0.05)
@@ -84,7 +84,7 @@ def test_a_drawn_camera_comes_back_within_its_intervals(measured: lg.metric.Meas
     assert any("f and L change the pictures alike" in note for note in measured.notes)
 
 
-def test_lengths_that_are_not_known_to_one_per_cent_are_named(measured: lg.metric.Measured) -> None:
+def test_lengths_that_are_not_known_to_one_per_cent_are_named(measured: lg.metrology.Measured) -> None:
     """f, and L and distances with it, rest on the 2 % of a data sheet."""
     note = next(one for one in measured.notes if one.startswith("not known to 1%"))
     half = 196 * measured.errors[0] / measured.camera.focal_length
@@ -94,13 +94,13 @@ def test_lengths_that_are_not_known_to_one_per_cent_are_named(measured: lg.metri
     assert not list(calibration._unsure(sure))
 
 
-def test_noise_that_lenslets_share_widens_the_intervals(measured: lg.metric.Measured) -> None:
+def test_noise_that_lenslets_share_widens_the_intervals(measured: lg.metrology.Measured) -> None:
     shared = board(corners(np.random.default_rng(1), shared=0.3), BOARD, NOMINAL)
     assert shared.noise.shared == pytest.approx(0.3, rel=0.2)
     assert shared.errors[2] > 1.5 * measured.errors[2]  # the distance b, which only the pictures tell
 
 
-def test_a_board_that_took_no_part_is_found_as_well_as_predicted(measured: lg.metric.Measured) -> None:
+def test_a_board_that_took_no_part_is_found_as_well_as_predicted(measured: lg.metrology.Measured) -> None:
     other = corners(np.random.default_rng(7), frames=3)
     for pose in measured.locate(other):
         chance = 3 / np.sqrt(4 * np.sum(other.frame == pose.frame))
@@ -108,7 +108,7 @@ def test_a_board_that_took_no_part_is_found_as_well_as_predicted(measured: lg.me
         assert 0.15 < pose.shift[0] < 0.4
 
 
-def test_a_point_is_triangulated_within_its_error(measured: lg.metric.Measured) -> None:
+def test_a_point_is_triangulated_within_its_error(measured: lg.metrology.Measured) -> None:
     point = np.array([0.28, 0.012, -0.02])
     y, x = np.mgrid[-3:4, -3:4].reshape(2, -1) * 23.3
     middle = CAMERA.project(point, np.array([1540.0, 2060.0]))[0]
@@ -122,7 +122,7 @@ def test_a_point_is_triangulated_within_its_error(measured: lg.metric.Measured) 
     assert np.all(alone.errors < found.errors)
 
 
-def test_places_that_share_an_error_leave_a_point_less_sure(measured: lg.metric.Measured) -> None:
+def test_places_that_share_an_error_leave_a_point_less_sure(measured: lg.metrology.Measured) -> None:
     point, center = np.array([0.28, 0.012, -0.02]), np.array([1540.0, 2060.0]) + 23.3 * np.mgrid[
         -3:4, -3:4
     ].reshape(2, -1).T  # fmt: skip
@@ -162,7 +162,7 @@ def test_noise_that_grows_with_blur_is_predicted_for_boards_elsewhere() -> None:
     assert max(far) > 1.15 * min(far)  # so that one noise for all would not pass
 
 
-def test_a_wild_corner_is_left_out_and_counted(seen: Corners, measured: lg.metric.Measured) -> None:
+def test_a_wild_corner_is_left_out_and_counted(seen: Corners, measured: lg.metrology.Measured) -> None:
     place = seen.place.copy()
     place[::200] += 8
     wild = board(dataclasses.replace(seen, place=place), BOARD, NOMINAL)
@@ -201,6 +201,21 @@ def test_boards_that_tell_nothing_are_refused(seen: Corners) -> None:
         Nominal(0.0, 5e-6, (10, 10))
 
 
+def test_six_corners_are_enough_for_a_picture_and_five_are_not(
+    seen: Corners, measured: lg.metrology.Measured
+) -> None:
+    """The least that a pose is found by, of a picture by itself and of one among others."""
+    first = seen[seen.frame == 0]
+    six, five = (first[np.isin(first.corner, [0, 3, 6, 14, 28, 34][:n])] for n in (6, 5))
+    (pose,) = measured.locate(six)
+    assert pose.shift == pytest.approx(measured.locate(first)[0].shift, abs=2e-3)
+    with pytest.raises(lg.CalibrationError, match=r"no picture has 6 corners .* the best has 5"):
+        measured.locate(five)
+    for few, poses in ((six, [0, 1, 3, 4]), (five, [1, 3, 4])):
+        kept = np.isin(seen.frame, [1, 3, 4]) | (seen.frame == 0) & np.isin(seen.corner, few.corner)
+        assert [one.frame for one in board(seen[kept], BOARD, NOMINAL).poses] == poses
+
+
 def test_one_picture_given_three_times_is_no_camera(seen: Corners) -> None:
     """b came out as 0, f to 12 µm, without a word."""
     one = seen[seen.frame == 0]
@@ -212,9 +227,9 @@ def test_one_picture_given_three_times_is_no_camera(seen: Corners) -> None:
         board(same, BOARD, NOMINAL)
 
 
-def test_a_measured_camera_survives_its_file(measured: lg.metric.Measured, tmp_path) -> None:
-    lg.metric.save(measured, tmp_path / "camera.json")
-    again = lg.metric.load(tmp_path / "camera.json")
+def test_a_measured_camera_survives_its_file(measured: lg.metrology.Measured, tmp_path) -> None:
+    lg.metrology.save(measured, tmp_path / "camera.json")
+    again = lg.metrology.load(tmp_path / "camera.json")
     assert again.camera == measured.camera
     assert again.board == measured.board
     assert again.noise.seen == measured.noise.seen
@@ -223,17 +238,17 @@ def test_a_measured_camera_survives_its_file(measured: lg.metric.Measured, tmp_p
     np.testing.assert_array_equal(again.poses[1].shift, measured.poses[1].shift)
     (tmp_path / "camera.json").write_text('{"kind": "lumigraph metric camera", "camera": {}}')
     with pytest.raises(lg.FormatError, match=r"camera\.json"):
-        lg.metric.load(tmp_path / "camera.json")
+        lg.metrology.load(tmp_path / "camera.json")
 
 
 def test_corners_survive_their_table(seen: Corners, tmp_path) -> None:
-    lg.metric.save_corners(seen, tmp_path / "corners.csv")
-    again = lg.metric.load_corners(tmp_path / "corners.csv")
+    lg.metrology.save_corners(seen, tmp_path / "corners.csv")
+    again = lg.metrology.load_corners(tmp_path / "corners.csv")
     np.testing.assert_array_equal(again.place, seen.place)
     np.testing.assert_array_equal(again.kind, seen.kind)
     (tmp_path / "corners.csv").write_text("frame,corner,y\n1,2,3\n")
     with pytest.raises(lg.FormatError, match="must have frame, corner, y, x, center_y, center_x"):
-        lg.metric.load_corners(tmp_path / "corners.csv")
+        lg.metrology.load_corners(tmp_path / "corners.csv")
 
 
 @pytest.mark.long  # 20 adjustments
@@ -249,7 +264,7 @@ def test_the_truth_lies_in_nine_of_ten_intervals() -> None:
 @pytest.mark.skipif(not (DATA / "compote_r12a").is_dir(), reason="the real corners are not here")
 @pytest.mark.long  # 20 s
 def test_a_raytrix_r12_is_measured_as_its_makers_lens_says() -> None:
-    seen, target, nominal = lg.metric.load_compote(DATA / "compote_r12a")
+    seen, target, nominal = lg.metrology.load_compote(DATA / "compote_r12a")
     found = board(seen, target, nominal)
     assert found.residual_px < 0.72
     assert found.camera.focal_length == pytest.approx(49.89e-3, rel=0.01)

@@ -19,7 +19,7 @@ def test_contrast_is_that_of_a_lenslet_and_the_main_lens():
     text = camera_file("plenoptic").replace("[71, 71]", "[41, 41]")
     camera = lg.PlenopticCamera.from_table(tomllib.loads(text)).replace(sensor={"pixel_pitch": "8 um"})
     names = ("mtf@3/mm", "mtf@5/mm", "mtf@60/mm", "mtf50_middle", "sample_on_chart")
-    found = lg.metric.simulated(camera, names)
+    found = lg.metrology.simulated(camera, names)
     f = np.array([3e3, 5e3])
     x = f * camera.wavelength * camera.separation / camera.pupil_diameter
     lens = 2 / np.pi * (np.arccos(x) - x * np.sqrt(1 - x**2))
@@ -33,7 +33,7 @@ def test_contrast_is_that_of_a_lenslet_and_the_main_lens():
 
 def test_other_cameras_and_names_are_refused(tmp_path, capsys):
     with pytest.raises(GeometryError, match=r"'mtf@3' is not measured. Give mtf50_middle, .* or mtf@10/mm"):
-        lg.metric.simulated(lg.FocusedPlenopticCamera.from_catalogue("thesis-plenoptic-2-m050"), ["mtf@3"])
+        lg.metrology.simulated(lg.FocusedPlenopticCamera.from_catalogue("thesis-plenoptic-2-m050"), ["mtf@3"])
     said = ["sweep", "lfm-guv", "--vary", "wavelength=500 nm,600 nm", "--measure", "mtf@10/mm"]
     assert main([*said, "-o", str(tmp_path / "t.csv")]) == 1
     assert "has no data sheet yet" in capsys.readouterr().err
@@ -46,7 +46,7 @@ def test_pictures_at_a_depth_are_refocused_there_and_the_worst_counts():
     camera = lg.PlenopticCamera.from_table(tomllib.loads(text)).replace(sensor={"pixel_pitch": "8 um"})
     names = ["mtf@3/mm", "sample_on_chart"]
     near, far, both = (
-        lg.metric.simulated(camera, names, depths=depths) for depths in ([0.0], [20e-3], [0.0, 20e-3])
+        lg.metrology.simulated(camera, names, depths=depths) for depths in ([0.0], [20e-3], [0.0, 20e-3])
     )
     assert 0.35 < far["mtf@3/mm"].value < near["mtf@3/mm"].value  # 0.12 where it is not refocused
     assert both["mtf@3/mm"].value == pytest.approx(far["mtf@3/mm"].value, abs=0.03)
@@ -64,9 +64,9 @@ def test_the_worst_is_the_least_contrast_and_the_largest_distortion():
 def test_a_depth_inside_the_focal_length_and_no_depths_are_refused():
     camera = lg.FocusedPlenopticCamera.from_catalogue("thesis-plenoptic-2-m050")
     with pytest.raises(GeometryError, match="there are no depths"):
-        lg.metric.simulated(camera, ["mtf@3/mm"], depths=[])
+        lg.metrology.simulated(camera, ["mtf@3/mm"], depths=[])
     with pytest.raises(GeometryError, match="inside its focal length"):
-        lg.metric.simulated(camera, ["mtf@3/mm"], depths=[-80e-3])
+        lg.metrology.simulated(camera, ["mtf@3/mm"], depths=[-80e-3])
     goal = lg.Goal("mtf@3/mm", True, depths=(0.0, -80e-3))
     with pytest.raises(GeometryError, match="inside its focal length"):
         goal.check(camera)
@@ -80,7 +80,7 @@ def test_a_goal_of_contrast_is_over_its_depths(monkeypatch):
         asked.append(depths)
         return {names[0]: Quantity(names[0], 0.25)}
 
-    monkeypatch.setattr(lg.metric, "simulated", simulated)
+    monkeypatch.setattr(lg.metrology, "simulated", simulated)
     assert lg.Goal("mtf@3/mm", True, depths=(-1e-3, 2e-3)).values(camera, 1.0) == {"mtf@3/mm": 0.25}
     assert lg.Goal("mtf@3/mm", True).values(camera, 1.0) == {"mtf@3/mm": 0.25}
     assert asked == [(-1e-3, 2e-3), (0.0,)]

@@ -10,15 +10,9 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.elements import LensletArray
-from lumigraph.operators.lenslets.cell_response import (
-    INFINITE,
-    SLACK,
-    CellAxis,
-    CellLenslets,
-    legendre,
-    nodes,
-)
+from lumigraph.operators.lenslets.cell_response import CellLenslets, legendre, nodes
 from lumigraph.operators.lenslets.lenslet_light import LensletLight, windows
+from lumigraph.operators.sampling.cell_axis import INFINITE, SLACK, CellAxis
 from lumigraph.operators.sampling.cells import OVERSAMPLING
 from lumigraph.propagation import propagate
 from lumigraph.units import mm, nm, um

@@ -35,7 +35,12 @@ def fetched(array):
     return arrays.to_numpy(array.to_device(PROCESSOR))
 
 
-@pytest.mark.parametrize("name", OPERATORS)
+LONG = "2.0, round, in hexagons", "2.0, turned"
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long) if name in LONG else name for name in OPERATORS]
+)
 def test_images_are_those_of_the_processor(name, rng):
     operator = OPERATORS[name]()
     for apply, shape in zip((operator.adjoint, operator.forward), operator.shape, strict=True):

@@ -68,28 +68,59 @@ def wave(optics, place, lenslet):
     to = np.cos(np.arange(20)[:, None] * np.arccos(nodes)) / 10
     to[0] /= 2
     at, weight = legendre.leggauss(64)
-    half, path, amplitude = through(optics)
-    y, x = np.meshgrid(half * at, half * at, indexing="ij")
-    squared, L = y**2 + x**2, optics.separation
-    smooth = chebyshev.chebgrid2d(at * half / (PITCH / 2), at * half / (PITCH / 2), to @ values @ to.T)
-    y, x = y + lenslet[0], x + lenslet[1]
+    path, amplitude = through(optics)
+    half = PITCH / 2
+    off_y, off_x = np.meshgrid(half * at, half * at, indexing="ij")
+    squared, L = off_y**2 + off_x**2, optics.separation
+    smooth = chebyshev.chebgrid2d(at, at, to @ values @ to.T)
+    y, x = off_y + lenslet[0], off_x + lenslet[1]
     phase = 2 * np.pi / optics.wavelength * (np.sqrt(L**2 + y**2 + x**2) - L - path(squared))
     field = smooth * amplitude(squared) * np.exp(1j * phase) * np.outer(weight, weight) * half**2
-    return y.ravel(), x.ravel(), field.ravel()
+    return y.ravel(), x.ravel(), field.ravel(), side(optics, off_y.ravel(), off_x.ravel())
+
+
+def sphere_of_glass(optics):
+    """Radius of the curved side (n - 1) f, index."""
+    return (optics.surface.index - 1) * optics.array.focal_length, optics.surface.index
+
+
+def side(optics, y, x):
+    """Sagitta, normal (z, y, x) and its cosine with refracted rays, of a curved side; None of ideal ones."""
+    if optics.surface is None:
+        return None
+    radius, index = sphere_of_glass(optics)
+    normal = np.stack([np.sqrt(radius**2 - y**2 - x**2), y, x]) / radius
+    return radius * (1 - normal[0]), normal, np.sqrt(1 - index**2 * (1 - normal[0] ** 2))
 
 
 def through(optics):
-    """Half the width of lenslets; path taken away and amplitude, by the squared distance from the middle."""
-    f, b, surface = optics.array.focal_length, optics.lenslet_distance, optics.surface
-    if surface is not None:
-        half, known = surface.seen(PITCH / 2, f), (PITCH / 2, f)
-        return half, lambda q: surface.path(q, *known), lambda q: surface.amplitude(q, *known)
+    """Path taken away and amplitude, by the squared distance from the middle."""
+    f, b = optics.array.focal_length, optics.lenslet_distance
+    if optics.surface is not None:
+        radius, index = sphere_of_glass(optics)
+
+        def amplitude(q):
+            cosine = np.sqrt(1 - q / radius**2)
+            return np.sqrt(cosine / np.sqrt(1 - index**2 * (1 - cosine**2))) / cosine
+
+        return lambda q: index * (radius - np.sqrt(radius**2 - q)), amplitude
     inverse = max(1 / f - 1 / b, 1e-9)
 
     def path(q):
         return np.sqrt(b**2 + q) - b + q / (np.sqrt(inverse**-2 + q) + 1 / inverse)
 
-    return PITCH / 2, path, np.ones_like
+    return path, np.ones_like
+
+
+def onwards(wavelength, b, apart, side):
+    """Rayleigh and Sommerfeld's kernel from a plane, or Kirchhoff's from a curved side."""
+    k, (y, x) = 2 * np.pi / wavelength, apart
+    sag, normal, turned = (0.0, None, None) if side is None else side
+    way = np.sqrt((b + sag) ** 2 + y**2 + x**2)
+    if normal is None:
+        return np.exp(1j * k * (way - b)) * b / way**2 * (1 + 1j / (k * way))
+    towards = (normal[0] * (b + sag) + normal[1] * y + normal[2] * x) / way
+    return np.exp(1j * k * (way - b)) / way * (turned + towards * (1 + 1j / (k * way))) / 2
 
 
 def reference(camera, place, middle, around=3):
@@ -100,14 +131,14 @@ def reference(camera, place, middle, around=3):
     nodes, weight = legendre.leggauss(3)
     at = (np.arange(-5, 6)[:, None] + nodes / 2).ravel()
     y, x = (g.ravel() for g in np.meshgrid(*((c + at) * pixel for c in first), indexing="ij"))
-    b, k, total = optics.lenslet_distance, 2 * np.pi / optics.wavelength, np.zeros(len(y), complex)
+    b, total = optics.lenslet_distance, np.zeros(len(y), complex)
     for i in range(-around, around + 1):
         for j in range(-around, around + 1):
-            v, u, field = wave(optics, place, (middle[0] + i * PITCH, middle[1] + j * PITCH))
+            v, u, field, curved = wave(optics, place, (middle[0] + i * PITCH, middle[1] + j * PITCH))
             for k0 in range(0, len(y), 256):
                 mine = slice(k0, k0 + 256)
-                way = np.sqrt(b**2 + (y[mine, None] - v) ** 2 + (x[mine, None] - u) ** 2)
-                total[mine] += (np.exp(1j * k * (way - b)) * b / way**2 * (1 + 1j / (k * way))) @ field
+                apart = y[mine, None] - v, x[mine, None] - u
+                total[mine] += onwards(optics.wavelength, b, apart, curved) @ field
     image = (np.abs(total / optics.wavelength) ** 2).reshape(11, 3, 11, 3)
     return np.einsum("iajb,a,b->ij", image, weight / 2, weight / 2), first.astype(int)
 
@@ -208,7 +239,7 @@ def test_paraxial_images_say_how_far_off_they_are():
 
 
 def test_slices_of_exact_cameras_count_what_the_field_changes(monkeypatch, tmp_path):
-    monkeypatch.setenv("lumigraphCACHE", str(tmp_path))
+    monkeypatch.setenv("LUMIGRAPH_CACHE", str(tmp_path))
     known = camera(model="auto", f_number=8.0).replace(lenslets={"count": (3, 3)})
     grid = lg.Grid.square(5, known.object_grid.pitch[0])
     scene = Scene([Slice(np.ones(grid.shape), grid, 0.0)])

@@ -120,12 +120,13 @@ def test_light_is_followed_to_enough_neighbours_where_points_light_few(
             1e-2, 1e-3, focused, {"pitch": 100.5 * um, "focal_length": 2.529 * mm, "fill_factor": 0.853},
             98.87 * mm, 0.0,
         ),
-        pytest.param(
+        (
             1e-3, 3e-4, plenoptic, {"pitch": 78.9 * um, "focal_length": 2.662 * mm, "fill_factor": 0.906},
-            109.23 * mm, -1.092 * mm, marks=pytest.mark.long,
+            109.23 * mm, -1.092 * mm,
         ),
     ],
 )  # fmt: skip
+@pytest.mark.long
 def test_whole_pictures_are_followed_to_enough_lenslets(accuracy, finer, camera, lenslets, distance, dz, rng):
     """With one fewer, images wider than a lenslet are off by 1.4e-2, those behind rims by 1.2e-3."""
     found = camera().replace(

@@ -260,7 +260,7 @@ def assert_equal(one, other):
 
 
 def test_what_is_kept_on_disk_comes_back_and_is_not_built_again(optics, tmp_path, monkeypatch):
-    monkeypatch.setenv("lumigraphCACHE", str(tmp_path))
+    monkeypatch.setenv("LUMIGRAPH_CACHE", str(tmp_path))
     monkeypatch.setattr(kernels, "_MATRICES", ByteCache(Budget(limit=0)))
     built = matrix(optics)
     damaged = tmp_path / f"{optics.key}.kept.npz"
@@ -280,7 +280,7 @@ def test_images_have_the_same_bits_whether_the_operator_was_built_or_found(tmp_p
     monkeypatch.setattr(kernels, "_MATRICES", ByteCache(Budget(limit=0)))
     camera, images = focused(), []
     for folder in ("a", "a", "b", "off"):  # built, found, built again, built and not kept
-        monkeypatch.setenv("lumigraphCACHE", folder if folder == "off" else str(tmp_path / folder))
+        monkeypatch.setenv("LUMIGRAPH_CACHE", folder if folder == "off" else str(tmp_path / folder))
         operator = camera.operator(accuracy=1e-2)
         scene = np.random.default_rng(1).random(operator.shape[1]).astype(np.float32)
         raw = operator.forward(scene)
@@ -354,7 +354,7 @@ def test_the_memory_that_is_free_does_not_choose_between_held_and_streamed(optic
     assert stream_bytes(optics) < build_bytes(optics)
     monkeypatch.setattr("lumigraph.core.memory.available", lambda: build_bytes(optics) - 1)
     monkeypatch.setattr(kernels, "_MATRICES", ByteCache())
-    monkeypatch.setenv("lumigraphCACHE", "off")
+    monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
     with pytest.raises(
         SamplingError, match=r"the periodic operator needs \S+ GiB but \S+ GiB are free\. Use"
     ):

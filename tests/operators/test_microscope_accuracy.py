@@ -36,6 +36,7 @@ def test_a_points_image_is_as_exact_as_asked(model, dz, accuracy, place):
     assert raw.metadata["error"]["rms"] < accuracy
 
 
+@pytest.mark.long  # light is followed to 1e-5
 def test_a_point_beside_the_array_states_the_error_of_what_was_computed():
     scope = _scope("scalar")
     found = [scope.imaged_point(7e-6, 1e-6, 0.0, accuracy) for accuracy in (1e-4, 1e-5)]

@@ -48,13 +48,17 @@ def check(key: Key, x: np.ndarray, rng: np.random.Generator):
     assert off(plane.derivative(x, np.ones(1)), high - low) < 1e-5
 
 
-@pytest.mark.parametrize("key", ["pitch", "phase of the pupil"])
-def test_slopes_are_central_differences_of_raw_images(key, rng):
-    check(PLAIN[key], rng.random(GRID.shape), rng)
+QUICK = "phase of the pupil"
+
+
+def test_slopes_are_central_differences_of_raw_images(rng):
+    check(PLAIN[QUICK], rng.random(GRID.shape), rng)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("key", [*PLAIN, *OTHER, *(f"{key}, round" for key in BEFORE)])
+@pytest.mark.parametrize(
+    "key", [key for key in (*PLAIN, *OTHER, *(f"{key}, round" for key in BEFORE)) if key != QUICK]
+)
 def test_slopes_by_all_parts_are_central_differences(key, rng):
     check((PLAIN | OTHER | ROUND)[key], rng.random(GRID.shape), rng)
 

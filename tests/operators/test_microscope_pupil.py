@@ -43,7 +43,9 @@ def test_images_are_those_of_the_simulation_which_propagates_on_a_grid(waves):
     assert off(images(accuracy=1e-2, double=False).forward(POINTS, waves * SOME), true) < 1.5e-2
 
 
-@pytest.mark.parametrize("scope", [SCOPE, ROUND], ids=["square", "round"])
+@pytest.mark.parametrize(
+    "scope", [pytest.param(SCOPE, id="square"), pytest.param(ROUND, id="round", marks=pytest.mark.long)]
+)
 def test_images_of_an_aberrated_point_are_those_of_the_simulation(scope):
     bent, one = scope.replace(objective={"aberrations": {7: 0.2, 9: -0.1}}), POINTS.positions[:1]
     true = bent.point_image(*one[0], accuracy=3e-2)

@@ -146,7 +146,7 @@ def test_planes_that_take_too_long_are_refused_and_minutes_are_told(monkeypatch)
     with pytest.raises(SamplingError, match=r"6 samples are as many points.*Use a smaller grid"):
         seen.forward(np.ones(GRID.shape))
     monkeypatch.setattr(plane_of_points, "LONGEST", 1e15)
-    monkeypatch.setattr("lumigraph.operators.periodic.kernels.A_MINUTE", 1e8)
+    monkeypatch.setattr("lumigraph.operators.lenslets.plane_of_points.A_MINUTE", 1e8)
     with pytest.warns(SamplingWarning, match="an image of 6 samples, as many points, takes some"):
         seen.forward(np.ones(GRID.shape))
 

@@ -15,6 +15,11 @@ from lumigraph.errors import SamplingWarning
 from lumigraph.propagation import METHODS, Propagate, propagate
 from lumigraph.propagation.angular_spectrum import transfer_function
 
+pytestmark = pytest.mark.filterwarnings(  # noise fills its window, and all of its frequencies
+    "ignore:.* of the light left the window:lumigraph.errors.SamplingWarning",
+    "ignore:.* goes beyond the Fresnel approximation:lumigraph.errors.SamplingWarning",
+)
+
 WAVELENGTH = 633e-9
 SPECTRAL = ("angular_spectrum", "band_limited", "band_limited_circular", "corrected_band_limited")
 SAME_PITCH = (*SPECTRAL, "multi_step_fresnel")

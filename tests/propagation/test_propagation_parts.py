@@ -15,6 +15,11 @@ from lumigraph.propagation.pruned import Band, Transfer, convolve, nonzero_rows
 from lumigraph.propagation.window import smooth_size, window_shape
 from lumigraph.propagation.zoom import Samples, _chirp_z, _fourier_matrix
 
+pytestmark = pytest.mark.filterwarnings(  # noise fills its window, and all of its frequencies
+    "ignore:.* of the light left the window:lumigraph.errors.SamplingWarning",
+    "ignore:.* goes beyond the Fresnel approximation:lumigraph.errors.SamplingWarning",
+)
+
 
 @given(n=st.integers(1, 20000), multiple=st.integers(1, 3))
 def test_a_smooth_size_is_quick_close_and_a_multiple(n, multiple):
@@ -146,6 +151,7 @@ def test_the_fresnel_phase_error_is_the_next_term_of_the_distance():
     assert sampling.fresnel_phase_error(z, r, wavelength) == pytest.approx(exact, rel=2e-3)
 
 
+@pytest.mark.filterwarnings("ignore:the field is sampled too coarsely:lumigraph.errors.SamplingWarning")
 def test_half_of_the_light_reaches_the_focus_at_twice_the_lens_pitch():
     # One-dimensional lens: 0.99 of the power at the right limit, 0.50 at the one printed in the thesis' 2.90.
     # A window of one row, unpadded, holds only fy = 0: a one-dimensional wave.

@@ -11,6 +11,11 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.propagation import Propagate, propagate
 
+pytestmark = pytest.mark.filterwarnings(  # noise fills its window, and all of its frequencies
+    "ignore:.* of the light left the window:lumigraph.errors.SamplingWarning",
+    "ignore:.* goes beyond the Fresnel approximation:lumigraph.errors.SamplingWarning",
+)
+
 
 def wave(n=700):
     data = np.random.default_rng(1).random((n, n)).astype(np.complex64)

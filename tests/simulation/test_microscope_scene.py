@@ -48,7 +48,7 @@ def test_a_point_between_samples_is_between_their_images(scope):
 
 
 def test_a_point_beyond_the_lenslets_is_dark_and_one_at_the_border_is_cut(scope):
-    assert scope.point_image(0.0, 200 * um, 0.0).sum() == 0
+    assert scope.point_image(0.0, 200 * um, 0.0, accuracy=1e-2).sum() == 0
     border = scope.point_image(0.0, scope.object_grid.x[-1], 20 * um, accuracy=1e-2)
     middle = scope.point_image(0.0, 0.0, 20 * um, accuracy=1e-2)
     assert 0.3 * middle.sum() < border.sum() < 0.8 * middle.sum()

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 import cameras
+import lumigraph as lg
+from lumigraph.core.grid import Grid
 from lumigraph.errors import FormatError, GeometryError, SamplingError
-from lumigraph.scene import Scene, Slice, SpectralLine
+from lumigraph.scene import Points, Scene, Slice, SpectralLine
 from lumigraph.simulation import Incoherent, Spectrum, simulate
+from lumigraph.studies.information.points import CameraSource
 from lumigraph.units import nm, um
 
 ROUGH = Incoherent(accuracy=1e-2)
@@ -144,7 +147,7 @@ def test_pictures_through_curves_are_those_of_many_wavelengths(camera):
     at, response = np.linspace(450, 650, 5) * nm, [0, 0.5, 1, 0.8, 0]
     scene = picture(camera, 1)
     few = Spectrum.curves(at, response, camera.path_difference)
-    many = Spectrum.curves(at, response, camera.path_difference, accuracy=1e-6)
+    many = Spectrum.curves(at, response, camera.path_difference, accuracy=1e-5)
     one = Spectrum((float(np.dot(few.wavelengths, few.weights)[0]),), ((1.0,),))
     images = [simulate(camera, scene, ROUGH, spectrum=each).data for each in (many, few, one)]
     off, alone = (np.linalg.norm(image - images[0]) / np.linalg.norm(images[0]) for image in images[1:])
@@ -180,3 +183,32 @@ def test_files_of_curves_name_their_columns(tmp_path, titles):
     (tmp_path / "curves.csv").write_text(f"{titles}\n400, 1\n500, 1\n")
     with pytest.raises(FormatError, match="Name them 'wavelength"):
         Spectrum.load(tmp_path / "curves.csv", 5e-6)
+
+
+@pytest.mark.parametrize("kind", ["one lens", "2.0", "2.0, past an edge"])
+def test_a_white_point_is_white(kind, camera):
+    """As a slice of one sample is: within 5 %; by each wavelength's own samples it was 1.4 : 1 : 0.7."""
+    one = lg.SingleLensCamera(
+        wavelength=550 * nm, object_distance=0.2, main_lens={"focal_length": 0.05, "diameter": 2e-3},
+        sensor={"pixel_pitch": 7 * um, "shape": (101, 101)},
+    )  # fmt: skip
+    parts: list[Slice | Points] = [Points(np.array([[2e-5, -1e-5, 2e-3]]), np.ones(1))]
+    if kind.endswith("edge"):
+        cover = np.zeros((40, 40), np.float32)
+        cover[:20] = 1
+        parts.append(Slice(0 * cover, Grid.square(40, 50 * um), dz=-5e-3, opacity=cover))
+    spectrum = Spectrum.rgb(650 * nm, 550 * nm, 450 * nm)
+    raw = simulate(one if kind == "one lens" else camera, Scene(parts), ROUGH, spectrum=spectrum)
+    energy = raw.data.sum((0, 1), dtype=float)
+    assert np.ptp(energy) < 0.05 * energy.mean()
+
+
+def test_light_of_a_points_bounds_is_the_same_at_all_wavelengths(camera):
+    place = np.array([2e-5, -1e-5, 1e-3])
+    seen = [camera.at_wavelength(w) for w in (450 * nm, 550 * nm, 650 * nm)]
+    light = [CameraSource(one, 1e-2).image(place).sum() for one in seen]
+    assert np.ptp(light) < 0.05 * np.mean(light)  # more light of longer waves falls beside the array
+    pair = camera.at_wavelength(620 * nm), camera.at_wavelength(640 * nm)
+    change = camera.part_images([pair]).derivative(Points(place[None], np.ones(1)), np.ones(1))
+    whole = camera.part_images([]).forward(Points(place[None], np.ones(1))).sum(dtype=float)
+    assert abs(change.sum(dtype=float)) < 5e-3 * whole  # by samples of their own, 6e-2 of it

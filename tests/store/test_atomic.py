@@ -56,7 +56,9 @@ def test_what_a_dead_writer_left_goes_at_the_next_start_and_a_living_ones_stays(
 
 def test_a_folder_set_aside_by_a_dead_writer_goes_back(tmp_path):
     """Where the system cannot swap folders, a kill may fall between the two steps."""
-    place = tmp_path / ".lumigraph-0123"
+    place = tmp_path / ".lumigraph-0123456789ab"
+    place.mkdir(mode=0o700)
+    (place / "workplace").write_bytes(atomic._mark(place.name))
     for name in ("old/a.zarr", "new"):
         (place / name).mkdir(parents=True)
     (place / "old" / "a.zarr" / "x").write_text("kept")

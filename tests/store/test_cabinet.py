@@ -18,7 +18,7 @@ ARRAYS = {"left": np.arange(6.0).reshape(2, 3), "right": np.array([1, 2], np.int
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     """A folder of this test's own."""
-    monkeypatch.setenv("lumigraphCACHE", str(tmp_path / "kept"))
+    monkeypatch.setenv("LUMIGRAPH_CACHE", str(tmp_path / "kept"))
     return tmp_path / "kept"
 
 
@@ -48,7 +48,7 @@ def test_nothing_is_found_under_another_key():
 
 
 def test_off_keeps_nothing(folder, monkeypatch):
-    monkeypatch.setenv("lumigraphCACHE", "OFF")
+    monkeypatch.setenv("LUMIGRAPH_CACHE", "OFF")
     assert store.folder() is None
     found = store.kept("key", built)
     np.testing.assert_array_equal(found["left"], ARRAYS["left"])
@@ -59,7 +59,7 @@ def test_off_keeps_nothing(folder, monkeypatch):
 
 @pytest.mark.parametrize("name", ["XDG_CACHE_HOME", "LOCALAPPDATA"])
 def test_without_a_choice_it_is_the_users_cache_folder(name, tmp_path, monkeypatch):
-    for other in ("lumigraphCACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+    for other in ("LUMIGRAPH_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
         monkeypatch.delenv(other, raising=False)
     assert store.folder() == Path.home() / ".cache" / "lumigraph"
     monkeypatch.setenv(name, str(tmp_path))
@@ -70,7 +70,7 @@ def test_a_user_without_a_home_keeps_nothing(monkeypatch):
     def homeless():
         raise RuntimeError("Could not determine home directory.")
 
-    for name in ("lumigraphCACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+    for name in ("LUMIGRAPH_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(Path, "home", homeless)
     assert store.folder() is None
@@ -93,7 +93,7 @@ def test_a_damaged_file_is_built_again(folder, damage):
 @pytest.mark.parametrize("where", ["kept", "off"])
 def test_the_order_in_memory_is_the_one_that_was_built(order, where, monkeypatch):
     if where == "off":
-        monkeypatch.setenv("lumigraphCACHE", "off")
+        monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
     array = np.arange(24.0).reshape(2, 3, 4).astype(">f4", order=order)
     for _ in range(2):
         found = store.kept("key", lambda: {"array": array, "part": array[:, 1:], "one": np.float32(3)})

@@ -220,3 +220,11 @@ def test_the_command_writes_folders(tmp_path, capsys):
     assert (tmp_path / "page" / "index.html").is_file()
     assert main(["view", str(tmp_path / "views.zarr"), "--export", str(tmp_path / "page.png")]) == 1
     assert "Give a file (.html), or a folder" in capsys.readouterr().err
+
+
+def test_the_bar_of_an_export_of_two_things_stands_at_a_half_after_the_first(tmp_path, rng):
+    volume = lg.Volume(rng.random((3, 64, 64)), lg.Grid((64, 64), 1e-6), (-1e-6, 0.0, 1e-6))
+    for things, bar in ((1, [1]), (2, [0.5, 1])):
+        seen, exhibits = [], [of_volume(str(k), volume) for k in range(things)]
+        viewer.export_folder(exhibits, tmp_path / str(things), coarse=4_000, tile=16, progress=seen.append)
+        assert seen == bar

@@ -239,8 +239,11 @@ def test_a_camera_is_shown_things_at_several_depths(tmp_path, name):
     if name != "lfm-fourier":
         camera = camera.replace(lenslets={"count": (9, 9)}, sensor={"shape": None})
     (tmp_path / "camera.toml").write_text(camera.to_toml())
-    shown = open_exhibit(tmp_path / "camera.toml")
+    seen = []
+    shown = open_exhibit(tmp_path / "camera.toml", progress=seen.append)
     assert "Simulated" in dict(shown.facts)
+    assert seen == sorted(seen)
+    assert seen[-1] == pytest.approx(0.4)
     if shown.planes is not None:
         assert len(shown.planes.positions) == 13
         first, last = np.asarray(shown.planes.data)[[0, -1]]

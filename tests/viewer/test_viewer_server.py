@@ -17,9 +17,11 @@ from urllib.parse import unquote
 
 import pytest
 
+from lumigraph.cli.options import Common
+from lumigraph.cli.serving import announce
 from lumigraph.errors import LumigraphError
-from lumigraph.viewer import Address, Resource, Site, address_of, safety, serve
-from lumigraph.viewer.server import LOOPBACK, _listener, application
+from lumigraph.viewer import Resource, Site, safety, serve
+from lumigraph.viewer.server import application
 
 HOST = b"127.0.0.1:8000"
 SITE = Site(
@@ -279,23 +281,42 @@ def test_tokens_differ(monkeypatch):
     assert found[0].rsplit("/", 2)[1] != found[1].rsplit("/", 2)[1]
 
 
-def test_a_file_keeps_its_address_and_the_secret_is_the_user_s_alone(tmp_path, monkeypatch):
-    one, two = (address_of([Path(name)], tmp_path) for name in ("a.zarr", "b.zarr"))
-    assert address_of([Path("a.zarr")], tmp_path) == one
-    assert one.token != two.token
-    assert len(one.token) >= 32
-    assert 49152 <= one.port < 65536
-    key = tmp_path / "viewer.key"
-    assert key.stat().st_mode & 0o777 == 0o600
-    key.chmod(0o644)
-    assert address_of([Path("a.zarr")], tmp_path) is None  # others may have read it
-    found = []
-    monkeypatch.setattr("uvicorn.Server.run", lambda self, sockets: None)
-    with _listener(LOOPBACK, 0) as taken:
-        busy = taken.getsockname()[1]
-        serve(SITE, ready=found.append, address=Address("t" * 32, busy))
-    assert found[0].endswith("/" + "t" * 32 + "/")
-    assert f":{busy}/" not in found[0]
+def test_a_browser_is_given_a_private_file_and_not_the_address(tmp_path, monkeypatch, capsys):
+    opened = threading.Event()
+    given = []
+    monkeypatch.setenv("LUMIGRAPH_CACHE", str(tmp_path))
+    monkeypatch.setattr("webbrowser.open", lambda uri: (given.append(uri), opened.set()))
+    address = "http://127.0.0.1:8000/" + "t" * 32 + "/"
+    announce(address, Common(), no_open=False)
+    assert opened.wait(30)
+    assert capsys.readouterr().out == f"{address}\n"
+    (uri,) = given
+    assert "t" * 32 not in uri
+    assert uri.startswith("file://")
+    (path,) = tmp_path.iterdir()
+    assert path.as_uri() == uri
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert f'content="0; url={address}"' in path.read_text()
+
+
+def test_the_file_for_the_browser_goes_when_the_program_ends(tmp_path):
+    program = "import sys; from pathlib import Path; from lumigraph.viewer import redirecting; "
+    program += "print(redirecting('http://a/', Path(sys.argv[1])).is_file())"
+    run = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True)
+    assert run.stdout == "True\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_file_for_the_browser_never_takes_the_place_of_another(tmp_path):
+    from lumigraph.viewer import redirecting
+
+    (tmp_path / "no folder").write_text("a file")
+    one, two = redirecting("http://a/", tmp_path), redirecting("http://b/?'\"<", tmp_path)
+    assert one != two
+    assert "'" not in two.read_text().partition("url=")[2].partition('"')[0]
+    away = redirecting("http://c/", tmp_path / "no folder")  # in the system's folder for such files
+    assert away.stat().st_mode & 0o777 == 0o600
+    away.unlink()
 
 
 def test_what_is_computed_is_computed_once_and_kept():

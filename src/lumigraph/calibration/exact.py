@@ -30,7 +30,7 @@ def exactly(found: Calibration, pitch: float, rotation: float = 0.0) -> Calibrat
     Raises
     ------
     CalibrationError
-        The lattice found slips by more than a quarter of a pitch against the exact one.
+        The lattice found is rectangular, or slips by more than a quarter of a pitch against the exact one.
 
     Examples
     --------
@@ -42,6 +42,12 @@ def exactly(found: Calibration, pitch: float, rotation: float = 0.0) -> Calibrat
     """
     pitch = checks.positive("pitch", pitch, "px", CalibrationError)
     rotation = checks.finite("rotation", rotation, "rad", CalibrationError)
+    if found.lattice.layout == "rectangular":
+        down, along = found.lattice.pitches
+        raise CalibrationError(
+            f"the picture has a rectangular lattice of {down:.2f} x {along:.2f} px, which has no single "
+            "exact pitch. Leave out --exact."
+        )
     regular = Lattice.hex if found.lattice.layout == "hex" else Lattice.square
     lattice = replace(regular(pitch, _nearest(found.lattice, rotation)), kinds=found.lattice.kinds)
     ways = found.centers - found.indices @ lattice.matrix.T

@@ -38,17 +38,21 @@ class FollowedLattice(NamedTuple):
     errors: np.ndarray
 
 
-def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> FollowedLattice | None:
+def followed(
+    feature: "np.ndarray | Lines", basis: np.ndarray, is_hex: bool, *, share: float = 1.0
+) -> FollowedLattice | None:
     """The lattice near another one that a feature (y, x) repeats on, by the lines of its spectrum.
 
     Parameters
     ----------
     feature
-        Gaps, or light, of all micro-images.
+        Gaps, or light, of all micro-images; or its spectrum, where it is followed several times.
     basis
         Lattice vectors (y, x) of i and j in columns [px].
     is_hex
         True if there are three first harmonics.
+    share
+        Of the range of the search (25 % of the pitch, 6°) that the lattice may lie in.
 
     Returns
     -------
@@ -56,8 +60,8 @@ def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> FollowedLa
         None where its lines do not stand out.
     """
     pitch = math.sqrt(abs(float(np.linalg.det(basis))))
-    lines = _SpectrumLines.of(feature)
-    found = _nearest(lines, np.linalg.inv(basis), is_hex, min(feature.shape) / pitch)
+    lines = feature if isinstance(feature, Lines) else Lines.of(feature)
+    found = _nearest(lines, np.linalg.inv(basis), is_hex, min(lines.shape) / pitch, share)
     if found is None or found.evidence < _EVIDENCE:
         return None
     waves, errors = _refined(lines, found, pitch)
@@ -65,19 +69,21 @@ def followed(feature: np.ndarray, basis: np.ndarray, is_hex: bool) -> FollowedLa
 
 
 @dataclass(frozen=True, slots=True)
-class _SpectrumLines:
+class Lines:
     """Amplitudes of a windowed picture's spectrum, between its own bins too; x is not below 0."""
 
     amplitude: np.ndarray
     size: np.ndarray
+    shape: tuple[int, ...]
 
     @classmethod
-    def of(cls, picture: np.ndarray) -> "_SpectrumLines":
+    def of(cls, picture: np.ndarray) -> "Lines":
+        """Lines of a picture (y, x)."""
         window = [np.hanning(n + 2)[1:-1].astype(np.float32) for n in picture.shape]
         wave = (picture - picture.mean()) * window[0][:, None] * window[1]
         size = [scipy.fft.next_fast_len(3 * n // 2, real=True) for n in picture.shape]
         spectrum: Any = scipy.fft.rfft2(wave, size, workers=WORKERS)
-        return cls(np.abs(spectrum).astype(np.float32), np.array(size))
+        return cls(np.abs(spectrum).astype(np.float32), np.array(size), picture.shape)
 
     def heights(self, waves: np.ndarray) -> np.ndarray:
         """Amplitudes (...) at waves (..., 2) as (y, x) [1/px]."""
@@ -114,7 +120,9 @@ class _FoundWaves(NamedTuple):
     surroundings: float
 
 
-def _nearest(lines: _SpectrumLines, waves: np.ndarray, is_hex: bool, lenslets: float) -> _FoundWaves | None:
+def _nearest(
+    lines: Lines, waves: np.ndarray, is_hex: bool, lenslets: float, share: float
+) -> _FoundWaves | None:
     """The lattice around the expected one, stretched and turned, whose first lines are strongest together.
 
     A scene's own lattice may have a few of them, and be far stronger there; gaps have all. What is best at
@@ -132,6 +140,8 @@ def _nearest(lines: _SpectrumLines, waves: np.ndarray, is_hex: bool, lenslets: f
     score = np.exp(np.log(np.maximum(lines.heights(tried), 1e-30)).mean(0))
     around = float(np.median(score))
     score[~_is_peak(score)] = 0
+    score[np.abs(stretch) > share * _RANGE] = 0
+    score[:, np.abs(turn) > share * _TURN] = 0
     best = np.unravel_index(int(np.argmax(score)), score.shape)
     if around <= 0:
         return None
@@ -157,7 +167,7 @@ def _is_peak(score: np.ndarray) -> np.ndarray:
     return found
 
 
-def _refined(lines: _SpectrumLines, found: _FoundWaves, pitch: float) -> tuple[np.ndarray, np.ndarray]:
+def _refined(lines: Lines, found: _FoundWaves, pitch: float) -> tuple[np.ndarray, np.ndarray]:
     """Waves of i and j (2, 2) by least squares over ever more harmonics, each at its own maximum.
 
     Their standard errors (2, 2), too.

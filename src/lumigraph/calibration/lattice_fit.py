@@ -2,19 +2,23 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from lumigraph.calibration.autocorrelation import SMALLEST_PITCH
 from lumigraph.calibration.devignette import as_raw, grey
+from lumigraph.calibration.few import few_discs
 from lumigraph.calibration.period import Request
 from lumigraph.calibration.tiles import LARGEST, in_tiles
 from lumigraph.calibration.unlit import saturated, unlit
-from lumigraph.calibration.whole import whole
+from lumigraph.calibration.vectors import UNEQUAL
+from lumigraph.calibration.whole import FoundLattice, whole
 from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
-from lumigraph.core.lattice import Layout
+from lumigraph.core.lattice import LAYOUTS, Layout
+from lumigraph.core.progress import Progress
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 
@@ -30,6 +34,7 @@ def calibrate(
     pixel_pitch: float | None = None,
     separation: float | None = None,
     lenslet_distance: float | None = None,
+    progress: Progress | None = None,
 ) -> Calibration:
     """Micro-image lattice of a white image, or of a raw image alone, with the centre of every micro-image.
 
@@ -48,9 +53,10 @@ def calibrate(
         Picture (y, x[, c]) of an evenly lit surface, or a list of several, or a raw image of any scene; a
         Bayer pattern is scaled to grey first.
     layout
-        "square" or "hex"; found by itself where None.
+        "square", "hex" or "rectangular" (two pitches); found by itself where None.
     pitch
-        Distance of neighbouring micro-images [px], to 10 %; found by itself where None.
+        Distance of neighbouring micro-images [px], to 10 %, of a rectangular lattice the mean of its two;
+        found by itself where None.
     rotation
         Direction of the rows of lenslets from +x towards +y [rad], to 2°; found by itself where None.
     pixel_pitch
@@ -58,6 +64,8 @@ def calibrate(
     separation, lenslet_distance
         Main lens to lenslets and lenslets to sensor [m], where known: kept in the result, which `decode`
         and `rendered_grid` need for lengths in metres.
+    progress
+        Called with the fraction that is done.
 
     Returns
     -------
@@ -86,7 +94,7 @@ def calibrate(
     first, original = _light(white)
     _check_request(layout, pitch, rotation)
     request, shape = Request(layout, pitch, rotation), (original.shape[0], original.shape[1])
-    found = in_tiles(original, request) if max(shape) > LARGEST else whole(original, request)
+    found = _found(original, request, progress)
     spots, model = found.fitted.spots, found.fitted.model(shape)
     rms = float(np.sqrt(((spots.centers - model.position(spots.indices)) ** 2).sum(-1).mean()))
     bright = max(float(np.percentile(spots.light, 95)), 1e-30)
@@ -95,9 +103,23 @@ def calibrate(
         rms if found.measured else math.nan,
         pixel_pitch if pixel_pitch is not None else first.pixel_pitch, separation, lenslet_distance,
         warp=found.fitted.warp, light=np.round(spots.light / bright, _DECIMALS), fill=found.fill,
-        missing=unlit(original, model, spots.centers, white=found.white), sharpness=found.sharpness,
+        missing=unlit(original, model, spots.centers, white=found.white, few=found.how == "edges"),
+        sharpness=found.sharpness,
         notes=(*found.notes, *_overexposed(first, model, spots.indices)),
     )  # fmt: skip
+
+
+def _found(original: np.ndarray, request: Request, progress: Progress | None) -> FoundLattice:
+    """The lattice by the edges of a few large discs, or by many small ones as a whole or in tiles."""
+    if (few := few_discs(original, request)) is not None:
+        return FoundLattice(few.fitted, "edges", white=True, fill=few.fill)
+    large = max(original.shape) > LARGEST
+    found = in_tiles(original, request, progress) if large else whole(original, request, progress)
+    lattice = found.fitted.lattice
+    if lattice.layout == "hex" or request.layout is not None:
+        return found
+    layout = "rectangular" if max(lattice.pitches) > UNEQUAL * min(lattice.pitches) else "square"
+    return found._replace(fitted=found.fitted._replace(lattice=replace(lattice, layout=layout)))
 
 
 def _overexposed(image: RawImage, model: Calibration, indices: np.ndarray) -> tuple[str, ...]:
@@ -131,8 +153,10 @@ def _light(white: RawImage | Array | Sequence[RawImage | Array]) -> tuple[RawIma
 
 
 def _check_request(layout: str | None, pitch: float | None, rotation: float | None) -> None:
-    if not (layout is None or isinstance(layout, str)) or layout not in (None, "square", "hex"):
-        raise CalibrationError(f"layout is {layout!r} but must be 'square' or 'hex', or left out.")
+    if not (layout is None or isinstance(layout, str)) or layout not in (None, *LAYOUTS):
+        raise CalibrationError(
+            f"layout is {layout!r} but must be 'square', 'hex' or 'rectangular', or left out."
+        )
     if pitch is not None and checks.positive("pitch", pitch, "px", CalibrationError) < SMALLEST_PITCH:
         raise CalibrationError(
             f"pitch is {pitch:g} px but micro-images below {SMALLEST_PITCH:g} px cannot be separated. "

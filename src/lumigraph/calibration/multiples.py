@@ -11,6 +11,7 @@ from lumigraph.calibration.vectors import Vectors, oriented
 _THIRDS = (8, 8), (16, 16)
 _ALIASED = 12.0  # px of pitch below which whole pixels make neighbours differ
 _ABSENT = 0.12  # of the weakest first harmonic of the finer, or better, lattice: what only another one has
+_BETWEEN = 0.15  # orders beside those of another lattice
 _ALIKE = 0.55  # correlation of lenslets of several kinds; touching discs of one kind reach 0.46
 _COARSEST = 9  # cells of the finer lattice in one of the coarser
 AROUND = 0.04
@@ -122,6 +123,19 @@ def faint(picture: Gaps, vectors: Vectors, best: Vectors) -> bool:
     """
     mine, rest = (picture.heights(_first(one)) for one in (best, vectors))
     return bool(rest.max() < _ABSENT * mine.min())
+
+
+def without_lines(picture: Gaps, vectors: Vectors, other: Vectors) -> bool:
+    """True if the first harmonics that a lattice has and another one has not are next to nothing."""
+    steps = np.stack(np.meshgrid(*2 * [np.arange(-3, 4)], indexing="ij"), -1).reshape(-1, 2)
+    waves = steps @ np.linalg.inv(np.stack([vectors.column, vectors.row], -1))
+    waves = waves[(waves[:, 1] > 0) | ((waves[:, 1] == 0) & (waves[:, 0] > 0))]
+    first = _first(other)
+    waves = waves[np.hypot(*waves.T) < 1.2 * np.hypot(*first.T).max()]
+    order = waves @ np.stack([other.column, other.row], -1)
+    extra = waves[np.abs(order - np.rint(order)).max(-1) > _BETWEEN]
+    mine = picture.heights(first).min()
+    return not len(extra) or bool(picture.heights(extra).max() < _ABSENT * mine)
 
 
 def _first(vectors: Vectors) -> np.ndarray:

@@ -35,8 +35,10 @@ def overlapping(cell: np.ndarray, lattice: Lattice) -> OverlappingDiscs | None:
 
     The harmonics of discs of all sizes, anywhere in the cell, are compared with those of the mean
     micro-image `cell` (m, m). Overlapping ones are believed where they explain it far better than those
-    with gaps.
+    with gaps; not on a rectangular lattice, whose micro-images need not be round.
     """
+    if lattice.layout == "rectangular":
+        return None
     reach = np.rint(np.fft.fftfreq(_PLACES) * _PLACES).astype(int)
     orders = np.stack(np.meshgrid(reach, reach, indexing="ij"), -1)
     waves = orders @ np.linalg.inv(lattice.matrix)

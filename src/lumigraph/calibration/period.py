@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from lumigraph.calibration.autocorrelation import SMALLEST_PITCH, Peaks, autocorrelation, reduced, refined
-from lumigraph.calibration.multiples import AROUND, faint, finest, singles, without_beats
-from lumigraph.calibration.spectrum import Gaps, PowerSpectrum, polished
+from lumigraph.calibration.following import Lines, followed
+from lumigraph.calibration.multiples import AROUND, faint, finest, singles, without_beats, without_lines
+from lumigraph.calibration.spectrum import Gaps, PowerSpectrum, polished, single_direction
 from lumigraph.calibration.vectors import Vectors
 from lumigraph.core.lattice import Layout
 from lumigraph.errors import CalibrationError
@@ -30,6 +31,12 @@ _FOLDED = 768  # px of the middle that are folded
 _FEWEST = 2.8  # lenslets across a picture
 _NEAR = 0.012  # of a pitch, within which two candidates are one
 _LOOKED_AT = 4  # candidates polished
+_LONGEST = 3.4  # lengths of a rectangular lattice's vectors
+_HALF, _CLEARLY = 0.6, 1.2  # of a regular lattice's score: what a rectangular one must have, and at the end
+_CERTAIN = 12.0  # of the score of a rectangular one: twice that of a regular one
+_ASIDE = 0.16  # of 25 % of the pitch and 6 degrees that a candidate may lie beside the lattice
+_DIVISIONS = ((3, 1), (1, 3), (2, 2), (2, 1), (1, 2))  # cells along a row, and down, in one of an alias
+_FOLLOWED = 1024  # px of the middle that it is followed in
 _SIZE = 2048  # px of the middle of the picture that is looked at
 
 
@@ -62,19 +69,123 @@ class _Candidate(NamedTuple):
     score: float
 
 
-def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
+class _Looked(NamedTuple):
+    """Middles (y, x) of a picture's features (light, gaps, smoother gaps), and their spectra."""
+
+    middles: list[np.ndarray]
+    spectra: list[PowerSpectrum]
+    correlated: list[tuple[np.ndarray, Peaks]]
+    gaps: Gaps
+    light: Gaps
+
+    @classmethod
+    def at(cls, features: list[np.ndarray]) -> "_Looked":
+        """Features of a picture, looked at in its middle."""
+        middles = [_middle(feature) for feature in features]
+        correlations = [autocorrelation(feature) for feature in middles[:2]]
+        return cls(
+            middles, [PowerSpectrum(feature) for feature in middles],
+            [(correlation, Peaks(correlation)) for correlation in correlations],
+            Gaps(middles[1]), Gaps(_middle(features[0], _FOLDED)),
+        )  # fmt: skip
+
+    @property
+    def longest(self) -> float:
+        """Longest lattice vector [px] that a picture can show."""
+        return max(self.middles[0].shape) / _FEWEST
+
+
+def lattice_vectors(features: list[np.ndarray], request: Request) -> list[Vectors]:
     """Lattice vectors of a picture, from its features (y, x): light, gaps, smoother gaps.
+
+    Those of a rectangular lattice, where it explains the picture better, come before those of the square or
+    hexagonal one: a scene may have lines between those of its lenslets, a white image has none.
 
     Raises
     ------
     CalibrationError
-        No period, several lattices, or a pitch, rotation or layout that the picture does not support.
+        No period, or one in a single direction; several lattices; or a pitch, rotation or layout that the
+        picture does not support.
     """
-    middles = [_middle(feature) for feature in features]
+    looked, regular, refusal = _Looked.at(features), None, None
+    oblong_only = request.layout == "rectangular"
+    try:
+        regular = _regular(looked, Request() if oblong_only else request)
+    except CalibrationError as error:
+        refusal = error
+    if regular is None and (pitch := single_direction(looked.light)) is not None:
+        raise CalibrationError(
+            f"the image shows a one-dimensional (cylindrical) lens array: it repeats every {pitch:.2f} px in "
+            "one direction only, where a lattice repeats in two. lumigraph has no model of cylindrical "
+            "lenslets; if they are round, take a white image with dark gaps on all sides."
+        )
+    oblong = _oblong(looked, request, regular) if request.layout in (None, "rectangular") else None
+    found = [oblong, None if oblong_only else regular]
+    if regular is not None and oblong_only and oblong is None:
+        raise CalibrationError(_unlike(request, regular))
+    if refusal is not None and oblong is None:
+        raise refusal
+    return [one for one in found if one is not None]
+
+
+def _oblong(looked: _Looked, request: Request, regular: Vectors | None) -> Vectors | None:
+    """The rectangular lattice that explains a picture far better than a square or hexagonal one, or None."""
+    pairs = [pair for spectrum in looked.spectra for pair in spectrum.pairs(_LONGEST)]
+    for correlation, peaks in looked.correlated:
+        pairs += _pairs(correlation, peaks, peaks.strong(_PART * peaks.top()), request, _LONGEST)
+    found = [Vectors.rectangular(first, second, looked.longest) for first, second in pairs]
+    found = _distinct([v for v in found if v is not None and request.near(v)], _NEAR)
+    ranked = _ranked(looked.spectra, found) if found else []
+    ranked = [c for c in ranked if c.score > _HALF * _rival(looked, regular, c.vectors)][:_LOOKED_AT]
+    if not ranked:
+        return None
+    lines = [Lines.of(_middle(feature, _FOLLOWED)) for feature in looked.middles[:2]]
+    polished = [one for c in ranked for one in _straightened(lines, c.vectors)]
+    again = [c for c in _ranked(looked.spectra, _distinct(polished, _NEAR)) if request.allows(c.vectors)]
+    if not again:
+        return None
+    best = _undivided(looked.light, again[0].vectors)
+    if regular is not None and without_lines(looked.light, best, regular):
+        return None
+    clearly = _CLEARLY if regular is not None and regular.is_regular else 1.0
+    score = max(again[0].score, _total(looked.spectra, best, math.sqrt(best.area)))
+    return best if score > max(_CERTAIN, clearly * _rival(looked, regular, best)) else None
+
+
+def _undivided(light: Gaps, vectors: Vectors) -> Vectors:
+    """The finest rectangular lattice that has all lines of one that may hold several of its cells."""
+    for parts in _DIVISIONS:
+        row, column = vectors.row / parts[0], vectors.column / parts[1]
+        if min(math.hypot(*row), math.hypot(*column)) < SMALLEST_PITCH:
+            continue
+        finer = Vectors.rectangular(row, column)
+        if finer is not None and without_lines(light, vectors, finer):
+            return finer
+    return vectors
+
+
+def _rival(looked: _Looked, regular: Vectors | None, vectors: Vectors) -> float:
+    """Score of a regular lattice over the first orders of the coarser of it and a rectangular one."""
+    if regular is None:
+        return 0.0
+    return _total(looked.spectra, regular, math.sqrt(max(regular.area, vectors.area)))
+
+
+def _straightened(lines: list[Lines], vectors: Vectors) -> list[Vectors]:
+    """Rectangular lattices near one that the lines of light and gaps follow, and itself."""
+    result = [vectors]
+    for each in lines:
+        found = followed(each, np.stack([vectors.column, vectors.row], -1), False, share=_ASIDE)
+        if found is not None and (one := Vectors.rectangular(*reduced(*found.basis.T))) is not None:
+            result.append(one)
+    return result
+
+
+def _regular(looked: _Looked, request: Request) -> Vectors:
+    """Vectors of a square or hexagonal lattice."""
+    middles, spectra, gaps, light = looked.middles, looked.spectra, looked.gaps, looked.light
     pairs, tops, repeats = [], [], []
-    for feature in middles[:2]:
-        correlation = autocorrelation(feature)
-        peaks = Peaks(correlation)
+    for correlation, peaks in looked.correlated:
         tops.append(peaks.top())
         strong = peaks.strong(_PART * tops[-1])
         repeats.append([float(peaks.lengths[k]) for k in strong])
@@ -85,31 +196,34 @@ def lattice_vectors(features: list[np.ndarray], request: Request) -> Vectors:
             f"where a lattice gives over {_LEAST:g}. Use an evenly lit, focused white image with dark gaps "
             "between at least 3 x 3 micro-images."
         )
-    spectra = [PowerSpectrum(feature) for feature in middles]
     for spectrum in spectra:
         pairs += spectrum.pairs()
-    longest = max(middles[0].shape) / _FEWEST
-    found = [Vectors.of(first, second, longest) for first, second in pairs]
+    found = [Vectors.of(first, second, looked.longest) for first, second in pairs]
     found = _distinct([v for v in found if v is not None and request.near(v)], _NEAR)
     if not found:
         raise CalibrationError(_nothing(pairs, repeats[int(np.argmax(tops))]))
-    gaps, light = Gaps(middles[1]), Gaps(_middle(features[0], _FOLDED))
     ranked = _ranked(spectra, without_beats(found, (light, gaps)))
+    best = _looked_at(looked, ranked)
+    return _best(best, request, middles[0].shape, (light, gaps))
+
+
+def _looked_at(looked: _Looked, ranked: list[_Candidate]) -> list[_Candidate]:
+    """The likeliest candidates, made regular where they are."""
     chosen: list[Vectors] = []
     for candidate in ranked:
         if len(chosen) == _LOOKED_AT or candidate.score < 0.5 * ranked[0].score:
             break
-        one = finest(light, candidate.vectors)
+        one = finest(looked.light, candidate.vectors)
         if not any(one.same(other, AROUND) for other in chosen):
             chosen.append(one)
-    chosen = singles([_middle(feature, _FOLDED) for feature in middles], chosen)
-    best = _ranked(spectra, _distinct([_polished(gaps, vectors) for vectors in chosen], _NEAR))
+    chosen = singles([_middle(feature, _FOLDED) for feature in looked.middles], chosen)
+    best = _ranked(looked.spectra, _distinct([_polished(looked.gaps, vectors) for vectors in chosen], _NEAR))
     if best[0].score < _KEPT * ranked[0].score:  # sheared, or no lattice of one pitch
         first, second = reduced(ranked[0].vectors.row, ranked[0].vectors.column)
         if math.hypot(*second) > _SHEARED * math.hypot(*first):
             raise CalibrationError(_nothing([(first, second)], []))
-        best = _ranked(spectra, chosen)
-    return _best(best, request, middles[0].shape, (light, gaps))
+        best = _ranked(looked.spectra, chosen)
+    return best
 
 
 def _polished(gaps: Gaps, vectors: Vectors) -> Vectors:
@@ -125,18 +239,20 @@ def _middle(feature: np.ndarray, size: int = _SIZE) -> np.ndarray:
 
 
 def _pairs(
-    correlation: np.ndarray, peaks: Peaks, strong: list[int], request: Request
+    correlation: np.ndarray, peaks: Peaks, strong: list[int], request: Request, ratio: float = 1.35
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Refined reduced bases from the shortest strong peaks that are not parallel."""
-    limit = 1.12 * request.pitch + 1 if request.pitch is not None else math.inf
-    floor = 0.88 * request.pitch - 1 if request.pitch is not None else 0.0
+    limit, floor = math.inf, 0.0
+    if request.pitch is not None:  # the mean of two lengths up to a ratio
+        wide = 1.0 if ratio < 2 else 2 * ratio / (1 + ratio)
+        limit, floor = 1.12 * wide * request.pitch + 1, 0.88 * (2 - wide) * request.pitch - 1
     near = [k for k in strong if floor <= peaks.lengths[k] <= limit][:_MOST]
     lags = peaks.lags[near].astype(float)
     result, seen = [], set()
     better = {}
     for a in range(len(near)):
         for b in range(a + 1, len(near)):
-            if not _neighbours(lags[a], lags[b], 0.35):
+            if not _neighbours(lags[a], lags[b], 2 * ratio):
                 continue
             for k in (a, b):
                 if k not in better:
@@ -149,10 +265,10 @@ def _pairs(
     return result
 
 
-def _neighbours(first: np.ndarray, second: np.ndarray, slack: float) -> bool:
+def _neighbours(first: np.ndarray, second: np.ndarray, ratio: float) -> bool:
     a, b = math.hypot(*first), math.hypot(*second)
     sine = abs(first[0] * second[1] - first[1] * second[0]) / (a * b)
-    return sine > 0.5 and max(a, b) < (1 + slack) * min(a, b) * 2
+    return sine > 0.5 and max(a, b) < ratio * min(a, b)
 
 
 def _nothing(pairs: list[tuple[np.ndarray, np.ndarray]], repeats: list[float]) -> str:
@@ -207,10 +323,7 @@ def _best(
     allowed = [c for c in ranked if request.allows(c.vectors, c.vectors.pitch / min(shape) / 2)]
     if not allowed:
         best = ranked[0].vectors
-        raise CalibrationError(
-            f"the image has no lattice of {_asked(request)}: it has a {_told(best)}. "
-            f"Leave out what does not fit, or pass pitch={best.pitch:.1f}."
-        )
+        raise CalibrationError(_unlike(request, best))
     best = allowed[0]
     if best.score < _EVIDENCE:
         raise CalibrationError(
@@ -228,6 +341,13 @@ def _best(
             f"a {_told(best.vectors)} and a {_told(others[0].vectors)}. Pass pitch=, layout= or rotation=."
         )
     return best.vectors
+
+
+def _unlike(request: Request, best: Vectors) -> str:
+    return (
+        f"the image has no lattice of {_asked(request)}: it has a {_told(best)}. "
+        f"Leave out what does not fit, or pass pitch={best.pitch:.1f}."
+    )
 
 
 def _told(vectors: Vectors) -> str:

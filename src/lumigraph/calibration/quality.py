@@ -5,6 +5,8 @@ from scipy import ndimage
 
 from lumigraph.core.calibration import Calibration
 
+_SPOT = 0.03  # of the pitch: radius in which the middle of the smallest spots is bright
+
 
 def fill_of(cell: np.ndarray) -> float | None:
     """Width of the mean micro-image at half its brightness over the pitch; 1 where micro-images touch.
@@ -13,7 +15,8 @@ def fill_of(cell: np.ndarray) -> float | None:
     f-numbers match. None where the mean micro-image (m, m), its centre first, has no contrast.
     """
     size = len(cell)
-    dark, bright = float(cell.min()), float(np.median(cell[_near(size, 0.12)]))
+    dark, small = float(cell.min()), max(_SPOT, 1.5 / size)
+    bright = max(float(np.median(cell[near_centre(size, part)])) for part in (0.12, small))
     if bright - dark <= 0.05 * max(abs(bright), 1e-30):
         return None
     level = dark + (bright - dark) / 2
@@ -21,7 +24,7 @@ def fill_of(cell: np.ndarray) -> float | None:
     return float(np.mean(widths))
 
 
-def _near(size: int, part: float) -> np.ndarray:
+def near_centre(size: int, part: float) -> np.ndarray:
     """True for samples of a cell within a part of the pitch of its centre, which is its first sample."""
     k = np.minimum(np.arange(size), size - np.arange(size)) / size
     return k[:, None] ** 2 + k**2 <= part**2

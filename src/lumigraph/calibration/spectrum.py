@@ -17,6 +17,8 @@ _CAP = 8.0  # and above which a line is no better
 _MOST = 16  # lines paired
 _SEARCH = 0.05  # of the pitch, and radians, that a lattice is looked for around a candidate
 _SHARPEST, _HIGHEST = 0.14, 5.0  # 1/px, and orders, that gaps have after smoothing
+_BESIDE, _SPREAD = 3.0, 0.02  # bins, and of the frequency, over which a line of a 1-D array is spread
+_WEAK, _NOISE, _CERTAIN = 0.02, 6.0, 30.0  # of the strongest line; of the median that noise reaches, and not
 _FLOOR = 0.03  # of the mean power: beats of the lattice with the pixels make no lines
 
 
@@ -44,8 +46,8 @@ class PowerSpectrum:
         self.lines = power - ndimage.uniform_filter(power, _BACKGROUND, mode="wrap")
         self.largest = ndimage.maximum_filter(self.lines, 3, mode="wrap")
 
-    def pairs(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Reduced bases (y, x) [px] whose two first harmonics are among the strongest lines."""
+    def pairs(self, ratio: float = 1.3) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Reduced bases (y, x) [px], of lengths up to a ratio, whose first harmonics are strong lines."""
         waves = self._strongest()
         result = []
         for a in range(len(waves)):
@@ -53,7 +55,7 @@ class PowerSpectrum:
                 matrix = np.stack(reduced(waves[a].copy(), waves[b].copy()))
                 first, second = np.hypot(*matrix.T)
                 area = abs(np.linalg.det(matrix))
-                if min(first, second) > 0 and area > 0.5 * first * second and second < 1.3 * first:
+                if min(first, second) > 0 and area > 0.5 * first * second and second < ratio * first:
                     y, x = np.linalg.inv(matrix)
                     vectors = reduced(np.array([y[0], x[0]]), np.array([y[1], x[1]]))
                     if math.hypot(*vectors[0]) >= SMALLEST_PITCH:
@@ -125,6 +127,27 @@ class Gaps:
         """Amplitudes (...) at waves (..., 2) as (y, x) [1/px], whose x is not below 0."""
         at = np.moveaxis(waves * self._samples, -1, 0)
         return ndimage.map_coordinates(self.amplitude, at, order=1, mode="grid-wrap")
+
+
+def single_direction(light: Gaps) -> float | None:
+    """Pitch [px] of a picture that repeats in one direction only, as behind cylindrical lenses; else None.
+
+    Its lines stand on a straight line through the middle of the spectrum: what stands beside it is noise, or
+    less than a fiftieth of the strongest one.
+    """
+    y, x = (np.fft.fftfreq(2 * n) for n in light.shape)
+    y, x = y[:, None], np.abs(x[: light.amplitude.shape[1]])[None]
+    least, size = _BESIDE / min(light.shape), np.hypot(y, x)
+    amplitude = np.where((size > least) & (size < 0.5 / 2**0.5), light.amplitude, 0)
+    row, column = np.unravel_index(int(np.argmax(amplitude)), amplitude.shape)
+    wave = np.array([float(y[row, 0]), float(x[0, column])])
+    long = math.hypot(*wave)
+    beside = np.abs(y * wave[1] - x * wave[0]) / long > np.maximum(least, _SPREAD * size)
+    rest = amplitude[beside & (amplitude > 0)]
+    if not rest.size or amplitude[row, column] < _CERTAIN * np.median(rest):
+        return None
+    alone = float(rest.max()) < max(_WEAK * float(amplitude[row, column]), _NOISE * float(np.median(rest)))
+    return 1 / long if alone else None
 
 
 def polished(gaps: Gaps, basis: _Basis) -> tuple[np.ndarray, np.ndarray]:

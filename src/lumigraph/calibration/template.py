@@ -45,7 +45,7 @@ def mean_cell(picture: np.ndarray, model: Calibration, *, symmetric: bool = Fals
     """Mean of all micro-images in coordinates of the lattice's cell (m, m), its centre first."""
     lattice, (ny, nx) = model.lattice, picture.shape
     count = ny * nx
-    size = int(np.clip(math.sqrt(count / _SAMPLES), 8, min(192, 4 * lattice.pitch)))
+    size = int(np.clip(math.sqrt(count / _SAMPLES), 8, min(192, 4 * min(lattice.pitches))))
     rows = max(1, (1 << 20) // nx)
     light, weight = np.zeros(size * size), np.zeros(size * size)
     inverse = size * np.linalg.inv(lattice.matrix)
@@ -107,7 +107,7 @@ def _alike(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _reach(model: Calibration) -> int:
     """Pixels around a centre that hold its micro-image."""
-    return math.ceil(model.lattice.pitch * (0.5 if model.lattice.layout == "square" else 0.56))
+    return math.ceil(max(model.lattice.pitches) * (0.56 if model.lattice.layout == "hex" else 0.5))
 
 
 def _rows(tables: np.ndarray, model: Calibration, away: np.ndarray, clear: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ from lumigraph.calibration.whole import FoundLattice, How, whole
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.gaps import logarithm, valleys
 from lumigraph.core.lattice import Vector
+from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.errors import CalibrationError
 
 LARGEST = 2304
@@ -32,7 +33,7 @@ _NONE = Spots(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0))
 Area = tuple[slice, slice]
 
 
-def in_tiles(original: np.ndarray, request: Request) -> FoundLattice:
+def in_tiles(original: np.ndarray, request: Request, progress: Progress | None = None) -> FoundLattice:
     """The lattice of a large picture (y, x), and the centres of its micro-images.
 
     The lattice is found in the middle and fitted to ever more of the picture, by a few tiles at a time, so
@@ -46,7 +47,8 @@ def in_tiles(original: np.ndarray, request: Request) -> FoundLattice:
     """
     size = max(_MIDDLE, math.ceil(_LENSLETS * (request.pitch or 0)))
     corner = np.array([max(0, (n - size) // 2) for n in original.shape])
-    found = whole(original[tuple(slice(k, k + size) for k in corner)], request)
+    middle = original[tuple(slice(k, k + size) for k in corner)]
+    found = whole(middle, request, within(progress, 0, 0.4, "middle"))
     if not found.measured:
         raise CalibrationError(
             f"the middle of the picture repeats every {found.fitted.lattice.pitch:.2f} px but no centre "
@@ -56,11 +58,13 @@ def in_tiles(original: np.ndarray, request: Request) -> FoundLattice:
         )
     shape = (original.shape[0], original.shape[1])
     fitted = _moved(found.fitted, corner)
-    for part in _PARTS:
+    for k, part in enumerate(_PARTS):
+        within(progress, 0.4, 0.6)(Stage(k / len(_PARTS), "farther out"))
         tiles = _probes(shape, part, fitted.lattice.pitch)
         spots = _measured(original, tiles, fitted.model(shape), _PROBED.get(found.how, found.how))
         fitted = fit(_united(fitted.spots, spots), fitted.model(shape))
-    spots = _measured(original, _tiles(shape), fitted.model(shape), found.how)
+    tell = within(progress, 0.6, 1, "centres of micro-images")
+    spots = _measured(original, _tiles(shape), fitted.model(shape), found.how, tell)
     fitted = fit(spots, fitted.model(shape))
     _check_shares(fitted, shape)
     return found._replace(fitted=recentred(fitted, shape))
@@ -95,9 +99,15 @@ def _tiles(shape: tuple[int, int]) -> list[Area]:
     return [(row, column) for row in rows for column in columns]
 
 
-def _measured(original: np.ndarray, tiles: list[Area], model: Calibration, how: How) -> Spots:
+def _measured(
+    original: np.ndarray, tiles: list[Area], model: Calibration, how: How, tell: Progress = silent
+) -> Spots:
     """Micro-images whose centres lie in tiles."""
-    return lit(*(_tried(original, tile, model, how) for tile in tiles))
+    tried = []
+    for k, tile in enumerate(tiles):
+        tell(k / len(tiles))
+        tried.append(_tried(original, tile, model, how))
+    return lit(*tried)
 
 
 def _tried(original: np.ndarray, tile: Area, model: Calibration, how: How) -> TriedSpots:

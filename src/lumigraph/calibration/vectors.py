@@ -8,6 +8,10 @@ import numpy as np
 from lumigraph.core.lattice import Layout
 
 _RATIO, _ANGLES = 1.25, (52.0, 75.0)  # of neighbours: lengths, and what is hexagonal
+_OBLONG, _RIGHT = 3.4, 84.0  # lengths of neighbours of a rectangular lattice, and their angle [degrees]
+_SHEAR = 0.05  # cosine, by which a regular lattice may lean
+UNEQUAL = 1.03
+"""Lengths of neighbours from which a lattice is called rectangular, not square."""
 
 
 class Vectors(NamedTuple):
@@ -28,10 +32,35 @@ class Vectors(NamedTuple):
         layout: Layout = "hex" if angle < _ANGLES[1] else "square"
         return cls(*oriented(first, second, layout), layout)
 
+    @classmethod
+    def rectangular(
+        cls, first: np.ndarray, second: np.ndarray, longest: float = math.inf
+    ) -> "Vectors | None":
+        """Row and column vector where the basis is that of a rectangular lattice."""
+        a, b = sorted((math.hypot(*first), math.hypot(*second)))
+        if not UNEQUAL < b / a < _OBLONG or b > longest:
+            return None
+        if math.degrees(math.acos(min(1.0, abs(float(first @ second)) / (a * b)))) < _RIGHT:
+            return None
+        return cls(*oriented(first, second, "rectangular"), "rectangular")
+
+    @classmethod
+    def any_of(cls, first: np.ndarray, second: np.ndarray) -> "Vectors | None":
+        """Row and column vector of a reduced basis of any layout."""
+        return cls.rectangular(first, second) or cls.of(first, second)
+
     @property
     def pitch(self) -> float:
         """Mean length [px]."""
         return (math.hypot(*self.row) + math.hypot(*self.column)) / 2
+
+    @property
+    def is_regular(self) -> bool:
+        """True if lengths and angle are those of a square or hexagonal lattice, but for a few per cent."""
+        first, second = math.hypot(*self.row), math.hypot(*self.column)
+        wanted = 0.5 if self.layout == "hex" else 0.0
+        cosine = float(self.row @ self.column) / (first * second)
+        return max(first, second) < UNEQUAL * min(first, second) and abs(cosine - wanted) < _SHEAR
 
     @property
     def area(self) -> float:

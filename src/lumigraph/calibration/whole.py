@@ -12,13 +12,14 @@ from lumigraph.calibration.fitting import Fitted, fit, recentred
 from lumigraph.calibration.following import followed as light_followed
 from lumigraph.calibration.overlap import OverlappingDiscs, overlapping, separated
 from lumigraph.calibration.period import Request, lattice_vectors
-from lumigraph.calibration.quality import fill_of, sharpness_of
+from lumigraph.calibration.quality import fill_of, near_centre, sharpness_of
 from lumigraph.calibration.surface import Surface, flattened
 from lumigraph.calibration.template import mean_cell, sharpened
 from lumigraph.calibration.vectors import Vectors
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.gaps import logarithm, valleys
 from lumigraph.core.lattice import Lattice, Vector
+from lumigraph.core.progress import Progress, Stage, within
 from lumigraph.errors import CalibrationError
 
 _PARTS = (0.3, 0.45, 0.65, 0.85)  # of the picture that the fit grows over
@@ -31,14 +32,18 @@ _WHITE = 0.6  # of the lenslets are found on a white image
 _SHARE = 0.4  # of the lenslets must be found on a raw image
 _BY_LIGHT = ("light", "sharp")
 _STEADY = 0.12  # of a pitch that the quarters of a picture may place it apart: 0.02 and 0.06 on real ones
+_SMALL, _GROUND = 0.5, 0.1  # of the pitch: a spot's width; of its light: the ground half a pitch aside
+_CORE = 0.12  # of the pitch around a place where its light is looked at
+_BRIGHTER = 0.3  # of the contrast by which a lattice's points may be darker than places half a pitch aside
 _UNMEASURED = (
     "found by all gaps of a raw image together: no single centre was measured, so that no residual is known; "
     "check the overlay, or calibrate on a white image"
 )
 
 
-How = Literal["light", "sharp", "gaps", "logarithm", "discs", "nothing"]
-"""Source of the centres: first harmonics of the light, the mean micro-image, the dark gaps, the logarithm
+How = Literal["light", "sharp", "edges", "gaps", "logarithm", "discs", "nothing"]
+"""Source of the centres: first harmonics of the light, the mean micro-image, the edges of a few large discs,
+the dark gaps, the logarithm
 of the picture, overlapping discs; or nothing, where none was measured."""
 
 
@@ -61,7 +66,7 @@ class FoundLattice(NamedTuple):
         return self.how != "nothing"
 
 
-def whole(original: np.ndarray, request: Request) -> FoundLattice:
+def whole(original: np.ndarray, request: Request, progress: Progress | None = None) -> FoundLattice:
     """The lattice of a picture (y, x), and the centres of its micro-images.
 
     Raises
@@ -72,15 +77,42 @@ def whole(original: np.ndarray, request: Request) -> FoundLattice:
     shape = (original.shape[0], original.shape[1])
     flat = flattened(original)
     gaps = valleys(original, 1.0)
-    vectors = lattice_vectors([flat, gaps, valleys(original, 2.0)], request)
-    _check_size(vectors, shape)
-    found = _followed(original, flat, gaps, vectors)
+    tell = within(progress, 0, 1)
+    tell(Stage(0.0, "period of the lattice"))
+    candidates = lattice_vectors([flat, gaps, valleys(original, 2.0)], request)
+    tell(Stage(0.4, "centres of micro-images"))
+    found = _likelier(original, flat, gaps, candidates)
     start = found.fitted if found.measured else _by_lines(flat, found.fitted)
     cell = mean_cell(flat, start.model(shape))
     discs = overlapping(cell, start.lattice)
     found = found._replace(fill=fill_of(cell)) if discs is None else _overlapped(flat, start, discs)
     _check_spread(found)
+    tell(Stage(0.9, "micro-images"))
     return found._replace(sharpness=sharpness_of(original, found.fitted.model(shape)))
+
+
+def _likelier(
+    original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, candidates: list[Vectors]
+) -> FoundLattice:
+    """The fit to the first lattice that micro-images stand on as on a white image, or to the last."""
+    shape = (flat.shape[0], flat.shape[1])
+    for vectors in candidates[:-1]:
+        try:
+            _check_size(vectors, shape)
+            if (found := _followed(original, flat, gaps, vectors)).white:
+                return found
+        except CalibrationError:
+            continue  # the last one says what is wrong
+    last = candidates[-1]
+    _check_size(last, shape)
+    found = _followed(original, flat, gaps, last)
+    if last.layout == "rectangular" and not found.white:
+        raise CalibrationError(
+            f"the likeliest lattice is rectangular, of pitches {np.hypot(*last.column):.2f} x "
+            f"{np.hypot(*last.row):.2f} px, but its micro-images are {_spread(found.fitted):.2f} px off it, "
+            f"where {_CLEAR:g} px are allowed. Take a white image."
+        )
+    return found
 
 
 def _check_spread(found: FoundLattice) -> None:
@@ -118,7 +150,8 @@ def _followed(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, vectors:
     found, refused = [], []
     try:
         light = _by_light(flat, above, vectors)
-        if _spread(light.fitted) <= _CLEAR and _share(light.fitted, flat.shape) > _WHITE:
+        clear = _spread(light.fitted) <= _CLEAR or _sparse(mean_cell(flat, light.fitted.model(flat.shape)))
+        if clear and _share(light.fitted, flat.shape) > _WHITE:
             return light._replace(white=True)
         found.append(light)
     except CalibrationError as error:
@@ -145,7 +178,52 @@ def _followed(original: np.ndarray, flat: np.ndarray, gaps: np.ndarray, vectors:
     one = found[best]
     if one.how in _BY_LIGHT:
         return one._replace(notes=_uncertain(one.fitted))
-    return one._replace(notes=_raw_notes(one.fitted, original.shape))
+    return _on_light(flat, above, one) or one._replace(notes=_raw_notes(one.fitted, original.shape))
+
+
+def _sparse(cell: np.ndarray) -> bool:
+    """True if the mean micro-image (m, m) is a small spot on dark ground, which no scene can move far."""
+    fill, dark = fill_of(cell), float(cell.min())
+    aside = max(float(cell[part].mean()) for part in _aside(len(cell)))
+    center = float(cell[near_centre(len(cell), _CORE)].mean())
+    return fill is not None and fill < _SMALL and aside - dark < _GROUND * (center - dark)
+
+
+def _aside(size: int) -> list[np.ndarray]:
+    """Samples of a cell around the places half a pitch aside of its centre, along i, j and both."""
+    core, half = near_centre(size, _CORE), size // 2
+    return [np.roll(core, move, (0, 1)) for move in ((half, 0), (0, half), (half, half))]
+
+
+def _on_light(flat: np.ndarray, above: np.ndarray, found: FoundLattice) -> FoundLattice | None:
+    """The lattice moved to the light where its points are darker than places half a pitch aside; or None.
+
+    Gaps of sparse spots are as wide as the spots are apart, and their middle looks like a micro-image.
+
+    Raises
+    ------
+    CalibrationError
+        There no centres can be measured.
+    """
+    shape, lattice = (flat.shape[0], flat.shape[1]), found.fitted.lattice
+    cell = mean_cell(flat, found.fitted.model(shape))
+    center, aside = float(cell[near_centre(len(cell), _CORE)].mean()), [
+        float(cell[part].mean()) for part in _aside(len(cell))
+    ]  # fmt: skip
+    best = int(np.argmax(aside))
+    if aside[best] - center < _BRIGHTER * float(np.ptp(cell)):
+        return None
+    steps = np.array([(0.5, 0.0), (0.0, 0.5), (0.5, 0.5)][best])
+    moved = found.fitted._replace(lattice=lattice.moved(*(float(k) for k in lattice.matrix @ steps)))
+    try:
+        fitted = fit(measure(above, moved.model(shape)), moved.model(shape))
+    except CalibrationError as error:
+        raise CalibrationError(
+            f"the lattice of pitch {lattice.pitch:.2f} px stands where it is dark: light {center:.3g} on its "
+            f"points, {aside[best]:.3g} half a pitch aside, where no centres can be measured ({error}) "
+            "Take a white image that is evenly lit."
+        ) from error
+    return FoundLattice(recentred(fitted, shape), "light", _uncertain(fitted))
 
 
 def _agrees(fitted: Fitted, vectors: Vectors) -> bool:

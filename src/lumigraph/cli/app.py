@@ -44,6 +44,7 @@ from lumigraph.cli.tolerance import tolerance
 from lumigraph.cli.twin import twin
 from lumigraph.cli.view import is_shown, view
 from lumigraph.cli.wavefront import wavefront
+from lumigraph.core.printable import printable, printable_lines
 from lumigraph.errors import LumigraphError
 
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
@@ -111,7 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 0
         except (Exception, KeyboardInterrupt) as error:
             if debug:
-                traceback.print_exc()
+                print(printable_lines(traceback.format_exc()), file=sys.stderr)
             if isinstance(error, OSError):  # the output may be what failed, and Python would write it again
                 _discard_output()
             code, text = _explained(error)
@@ -151,6 +152,8 @@ def _optional(text: str) -> str:
 
     def option(found: re.Match[str]) -> str:
         name, value = found.groups()
+        if name == "views":  # of a mosaic: to the command line they are the input
+            return f"--mosaic {value}".rstrip()
         return f"--{name}{' ' * bool(value)}{value}" if name in names else found[0]
 
     if verb is simulate:
@@ -192,18 +195,18 @@ def _unknown(word: str) -> str:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    WARNED.get([]).append(str(message))
-    _say(f"warning: {message}")
+    WARNED.get([]).append(text := _optional(str(message)))
+    _say(f"warning: {text}")
 
 
 def _say(text: str) -> None:
     """One line on standard error, of at most 400 characters: the start and the end of a longer one."""
-    line = f"lumigraph: {' '.join(text.split())}"
+    line = f"lumigraph: {printable(' '.join(text.split()))}"
     if len(line) > _LONGEST:
         line = f"{line[: _LONGEST - 125]} ... {line[-120:]}"
     if sys.stderr is not None:
         with suppress(OSError):
-            print(line.encode("utf-8", "replace").decode(), file=sys.stderr)
+            print(line, file=sys.stderr)
 
 
 def _discard_output() -> None:

@@ -43,7 +43,8 @@ class WorkerOptions:
     workers
         Processes on this machine; one for each processor if left out.
     scheduler
-        Address of a running dask cluster instead, such as tcp://10.0.0.1:8786.
+        Address of a running dask cluster instead, such as tcp://10.0.0.1:8786, or tls:// with dask's own
+        configuration of certificates. A cluster without them trusts everybody who reaches its port.
     slurm
         Submit to SLURM instead, as an array of so many jobs.
     sbatch
@@ -164,7 +165,7 @@ def batch(
     with progress("batch") as shown, kept(output):
         line(f"how it stands: {cluster.page(output)}")
         found = cluster.batch(
-            work, items, output, what=what, workers=workers, part=part,
+            work, items, output, what=what, inputs=work.inputs(first), workers=workers, part=part,
             progress=StatusPage(output, shown),
             estimated=lambda needed: line(str(needed)),
         )  # fmt: skip

@@ -72,7 +72,7 @@ class CameraOptions:
 def calibrate(
     *white: Path,
     output: Output,
-    layout: Literal["square", "hex"] | None = None,
+    layout: Literal["square", "hex", "rectangular"] | None = None,
     pitch: Annotated[float | None, Parameter(allow_leading_hyphen=True, converter=pixels)] = None,
     rotation: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
     exact: Annotated[bool, Parameter(negative=())] = False,
@@ -93,9 +93,10 @@ def calibrate(
     output
         Calibration file (.toml).
     layout
-        Arrangement of the lenslets; found automatically if left out.
+        Arrangement of the lenslets (rectangular: two pitches); found automatically if left out.
     pitch
-        Distance between micro-images in pixels, such as 15 or '15 px', where the search needs it.
+        Distance between micro-images in pixels, such as 15 or '15 px', where the search needs it; the mean
+        of the two of a rectangular lattice.
     rotation
         Angle of the rows of lenslets from +x towards +y [degrees], where the search needs it.
     exact
@@ -126,8 +127,8 @@ def calibrate(
     pictures = [page for path in white for page in read_pages(path, "all").values()]
     picture = pictures[0]
     turn = None if rotation is None else math.radians(rotation)
-    with progress("calibrate"):
-        found = verbs.calibrate(pictures, layout, pitch, rotation=turn, **known)
+    with progress("calibrate") as told:
+        found = verbs.calibrate(pictures, layout, pitch, rotation=turn, progress=told, **known)
         if exact and pitch is not None:
             found = verbs.exactly(found, pitch, turn or 0.0)
         if overlay is not None:

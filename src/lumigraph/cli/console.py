@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from lumigraph.cli.options import Common
+from lumigraph.core.printable import printable, printable_json, printable_lines
 from lumigraph.core.progress import Progress, what_of
 
 FIRST_LINE = 10.0
@@ -22,9 +23,9 @@ _interrupted = threading.Event()
 def report(common: Common, text: str, values: Mapping[str, Any] | Sequence[Any]) -> None:
     """Print the result of a verb: text for people, or with `--json` one object, or a list of them."""
     if common.json:
-        print(json.dumps(values, default=plain, ensure_ascii=False))
+        print(printable_json(json.dumps(values, default=plain, ensure_ascii=False)))
     else:
-        print(text)
+        print(printable_lines(text))
 
 
 @contextmanager
@@ -38,7 +39,7 @@ def progress(task: str) -> Iterator[Progress]:
         def tell(fraction: float) -> None:
             if _interrupted.is_set():
                 raise KeyboardInterrupt
-            text = ": ".join(filter(None, (task, what_of(fraction))))
+            text = printable(": ".join(filter(None, (task, what_of(fraction)))))
             update(description=text, completed=fraction, total=1.0)
 
         yield tell
@@ -76,9 +77,14 @@ def _bar(task: str) -> Iterator[Callable[..., None]]:
     from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TimeRemainingColumn(),
+    )
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-        number = bar.add_task(task, total=None)
+        number = bar.add_task(printable(task), total=None)
         yield lambda **changes: bar.update(number, **changes)
 
 
@@ -100,7 +106,7 @@ def line(text: str) -> None:
     """One line on standard error, such as what a long run needs."""
     if sys.stderr is not None:
         with suppress(OSError):
-            print(f"lumigraph: {text}", file=sys.stderr, flush=True)
+            print(f"lumigraph: {printable(text)}", file=sys.stderr, flush=True)
 
 
 def plain(value: Any) -> Any:

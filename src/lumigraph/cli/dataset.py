@@ -13,6 +13,7 @@ from lumigraph.cli.console import line, progress
 from lumigraph.cli.deconvolve_options import depths
 from lumigraph.cli.options import COMMAND, COMMON, Common, Output
 from lumigraph.cli.standing import StatusPage
+from lumigraph.cli.sweep import anywhere
 from lumigraph.cli.tolerance import Tolerances, given_tolerances
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
@@ -97,7 +98,7 @@ def dataset(
         raise FormatError(f"--count is {count} but must be from 1 to {MOST}.")
     if seed < 0:
         raise FormatError(f"--seed is {seed} but must be at least 0.")
-    given, varied = load_camera(camera), dict(map(values, vary or []))
+    given, varied = load_camera(anywhere(camera)), dict(map(values, vary or []))
     given.check_accuracy(accuracy)
     meant = [changed(given, one) for one in combinations(varied)]
     taking = tuple(one.to_toml() for one in _as_built(meant, tolerance, cameras, seed))

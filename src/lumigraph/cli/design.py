@@ -82,7 +82,8 @@ def design(
         files.save_figure(plots.layout(described), plot)
     found = Result(
         "Design", f"{table.title[0].upper()}{table.title[1:]}, and all that follows in closed form.",
-        described, (str(table),), figures=lambda: _figures(described, table), extra=table.as_dict(),
+        described, tuple(str(table).splitlines()), figures=lambda: _figures(described, table),
+        extra=table.as_dict(),
         written=() if plot is None else (plot,),
     )  # fmt: skip
     if not page.web:

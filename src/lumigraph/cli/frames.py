@@ -1,5 +1,6 @@
 """Frames of a batch, and the output of a verb for each."""
 
+import glob
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -54,6 +55,9 @@ KINDS = {
 _INPUTS = {"calibration", "white", "dark"}
 """Files that come with each frame."""
 
+_WRITTEN = {"output", "report", "overlay", "confidence", "checkpoint"}
+"""Options that name what is written; any other file that a line names is one that it reads."""
+
 SIDE = 4
 """Frames of 'deconvolve' that a worker is given at a time; how many of them share products, it finds out."""
 
@@ -82,11 +86,14 @@ class Frames:
 
         if "frames" in item:
             return FrameGroup(item["first"], item["count"], self._run(item["frames"]))
+        from lumigraph.cluster.inputs import check_unchanged
+
         os.chdir(self.folder)
-        _check_unchanged(item)
+        check_unchanged([item])
         with tempfile.TemporaryDirectory(prefix="lumigraph-") as place, redirect_stderr(StringIO()):
             command, bound = self.bound(item, Path(place))
             result = command(*bound.args, **bound.kwargs)
+        check_unchanged([item])
         if KINDS[self.verb].is_table:
             return Values({"file": item["file"], **_numbers(result)})
         return result.thing
@@ -113,6 +120,13 @@ class Frames:
             for path in found if isinstance(found, list | tuple) else [found]:
                 if path is not None:
                     existing(path)
+
+    def inputs(self, item: dict[str, Any]) -> list[str]:
+        """Files and folders that the line names besides its frames: all that may change what comes out."""
+        with tempfile.TemporaryDirectory(prefix="lumigraph-") as place:
+            given = _flat(self.bound(item, Path(place))[1].arguments)
+        named = (one for name, value in given.items() if name not in _WRITTEN for one in _paths(value))
+        return sorted({path for path in named if path != item["file"]})
 
     @property
     def side_by_side(self) -> int:
@@ -179,6 +193,21 @@ def _flat(arguments: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def _paths(value: Any) -> Iterator[str]:
+    """Files and folders that an option's value names, by patterns too."""
+    from lumigraph.cluster.inputs import is_file
+
+    if isinstance(value, list | tuple):
+        for one in value:
+            yield from _paths(one)
+    elif isinstance(value, str | Path):
+        text = str(value)
+        if is_file(text) or (isinstance(value, Path) and value.is_dir()):
+            yield text
+        elif glob.has_magic(text):
+            yield from files.matching(text)
+
+
 def items_of(paths: Sequence[str], pages: str | None) -> Iterator[dict[str, Any]]:
     """Items of files and patterns, with the chosen pages of a stack; None for files as a whole."""
     for path in paths:
@@ -202,24 +231,20 @@ def runs(items: Sequence[dict[str, Any]], length: int) -> list[dict[str, Any]]:
 
 
 def _frames(path: Path, pages: str | None) -> Iterator[dict[str, Any]]:
+    from lumigraph.cluster.inputs import known
     from lumigraph.preparation import pages_of
 
-    known = path.stat()
-    about = {"file": str(path.absolute()), "size": known.st_size, "modified": known.st_mtime_ns}
+    about = known(path)
     for number in [None] if pages is None or path.is_dir() else pages_of(path, pages):
         yield {**about, "page": number}
 
 
 def _place(item: dict[str, Any]) -> tuple[Path, str | None]:
     """File and page of a frame."""
-    _check_unchanged(item)
+    from lumigraph.cluster.inputs import check_unchanged
+
+    check_unchanged([item])
     return Path(item["file"]), None if item["page"] is None else str(item["page"])
-
-
-def _check_unchanged(item: dict[str, Any]) -> None:
-    known = Path(item["file"]).stat()
-    if (known.st_size, known.st_mtime_ns) != (item["size"], item["modified"]):
-        raise FormatError(f"{item['file']} has changed since the batch began.")
 
 
 def _numbers(result: Result) -> dict[str, Any]:

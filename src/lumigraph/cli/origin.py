@@ -36,6 +36,10 @@ class RawOptions:
         Camera file, or a name of the catalogue: gives the calibration if no other is given, and depths.
     page
         Page of a stack of raw images, counted from 0.
+    bit_depth
+        Bits of the sensor, such as 12, where the file does not say and full pixels are to be known.
+    mosaic
+        Views, rows x columns, such as 5x5, of a picture made of blocks, one for each lenslet (ESLF).
     """
 
     calibration: Path | None = None
@@ -43,19 +47,22 @@ class RawOptions:
     dark: Path | None = None
     camera: str | None = None
     page: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
+    bit_depth: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
+    mosaic: str | None = None
 
     @property
     def is_given(self) -> bool:
         """True if some option is given that only a raw image needs."""
-        given = (self.calibration, self.white, self.dark, self.page)
+        given = (self.calibration, self.white, self.dark, self.page, self.bit_depth)
         return any(one is not None for one in given)
 
     def read(self, path: Path) -> "RawImage":
         """The raw image in a file, or on the page of a stack."""
+        from lumigraph.core.saturation import with_bits
         from lumigraph.preparation import read_pages
 
         (found,) = read_pages(path, None if self.page is None else str(self.page), one=True).values()
-        return found
+        return with_bits(found, self.bit_depth)
 
     def views(self, path: Path) -> "LightField | RawImage":
         """The views in a file, or the raw image that they can be decoded from.
@@ -65,7 +72,7 @@ class RawOptions:
         FormatError
             Something else, NaN, or views with something that only a raw image needs.
         """
-        from lumigraph import io
+        from lumigraph import io, rendering
         from lumigraph.core import checks
         from lumigraph.core.lightfield import LightField
         from lumigraph.core.raw import RawImage
@@ -73,17 +80,33 @@ class RawOptions:
         from lumigraph.core.stack import Stack
         from lumigraph.core.volume import Volume
 
-        one = self.page if io.opens_pages(path) else None
-        found = io.open(path, page=one)
+        one = self.page if self.mosaic is None and io.opens_pages(path) else None
+        found = io.open(path, page=one, views=self.views_of_mosaic)
         if isinstance(found, RawImage) or (one is None and isinstance(found, Stack | Volume)):
             return self.read(path)
         if not isinstance(found, LightField):
             raise FormatError(f"{path} holds a {called(found)} where views or a raw image are needed.")
         checks.finite_array(str(path), found.data, FormatError)
+        rendering.check_arrangement(found, str(path))
         if (self if one is None else replace(self, page=None)).is_given:
             raise FormatError(
-                f"{path} holds views, which need no --calibration, --white, --dark or --page. Leave them out."
+                f"{path} holds views, which need no --calibration, --white, --dark, --page or --bit-depth. "
+                "Leave them out."
             )
+        return found
+
+    @property
+    def views_of_mosaic(self) -> tuple[int, int] | None:
+        """Views (v, u) of --mosaic."""
+        if self.mosaic is None:
+            return None
+        rows, _, columns = self.mosaic.lower().partition("x")
+        try:
+            found = int(rows), int(columns or rows)
+        except ValueError:
+            found = 0, 0
+        if min(found) < 1:
+            raise FormatError(f"--mosaic is {self.mosaic!r} but must be numbers of views, such as 5x5.")
         return found
 
     def described(self, use: Use | None = None) -> "AnyCamera | None":

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import console, files
 from lumigraph.cli.options import COMMAND, WARNED, Common, section
+from lumigraph.core.printable import printable
 from lumigraph.core.result import Result
 from lumigraph.errors import LumigraphError
 
@@ -79,7 +80,7 @@ def tell(common: Common, result: Result) -> None:
     text, values = result.text(WARNED.get([])), result.values()
     if isinstance(common, ReportOptions) and common.report is not None:
         page(result).write(common.report)
-        text, values = f"{text}\nwritten {common.report}", {**values, "report": str(common.report)}
+        text, values = f"{text}\nwritten {printable(common.report)}", {**values, "report": str(common.report)}
     console.report(common, text, values if result.rows is None else result.rows)
 
 

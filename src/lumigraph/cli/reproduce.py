@@ -8,6 +8,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.core.printable import printable
 from lumigraph.core.progress import Stage
 from lumigraph.core.result import Result
 from lumigraph.errors import FormatError
@@ -65,7 +66,12 @@ def reproduce(
         run.write_records(results, output / "results.json")
     text = "\n\n".join([*map(_table, results), f"Open {output / 'report.html'}"])
     return Result(
-        "Reproduce", "", results, (text,), rows=run.records(results), failure=_failure(results, output)
+        "Reproduce",
+        "",
+        results,
+        tuple(text.split("\n")),
+        rows=run.records(results),
+        failure=_failure(results, output),
     )
 
 
@@ -90,7 +96,8 @@ def _tell(result: "Computed") -> None:
     """One line on standard error as soon as an experiment is finished."""
     failed = f"{len(result.failed)} FAIL" if result.failed else "none fails"
     took = "from an earlier run" if result.stored else f"{result.seconds:.1f} s"
-    print(f"{result.id}: {len(result.rows)} rows, {failed}, {took}", file=sys.stderr, flush=True)
+    line = printable(f"{result.id}: {len(result.rows)} rows, {failed}, {took}")
+    print(line, file=sys.stderr, flush=True)
 
 
 def _table(result: "Computed") -> str:

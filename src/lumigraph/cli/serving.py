@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from lumigraph.cli.console import report
+from lumigraph.cli.console import line, report
 from lumigraph.cli.options import Common
 from lumigraph.errors import FormatError
 
@@ -21,11 +21,21 @@ def check_port(port: int) -> None:
 
 
 def announce(address: str, common: Common, *, no_open: bool) -> None:
-    """Print a page's address on one line, and open a browser there unless --no-open is given."""
+    """Print a page's address on one line, and open a browser there unless --no-open is given.
+
+    The browser is given a file that leads there: what stands in its command line all users can read.
+    """
     report(common, address, {"address": address})
     sys.stdout.flush()
     if not no_open:
         import threading
         import webbrowser
 
-        threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+        from lumigraph.viewer import redirecting
+
+        try:
+            file = redirecting(address)
+        except OSError as error:
+            line(f"no browser is opened: {error.strerror or error}. Open the address above.")
+            return
+        threading.Thread(target=webbrowser.open, args=(file.as_uri(),), daemon=True).start()

@@ -14,7 +14,8 @@ from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     from lumigraph.core.prepared import PreparedImage
-    from lumigraph.instruments import FoundShifts, Instrument
+    from lumigraph.instruments import Instrument
+    from lumigraph.metrology.scanning import FoundShifts
 
 MOST_STEPS = 30
 """Most steps of a scan, along each axis."""
@@ -62,8 +63,8 @@ class SeveralOptions:
 
     def moved(self, camera: "Instrument", count: int) -> Shifts:
         """Shifts (y, x) [m], one for each raw image."""
-        from lumigraph.instruments import scan
         from lumigraph.instruments.capabilities import WithLenslets
+        from lumigraph.metrology.scanning import scan
 
         if self.shifts is None:
             return ((0.0, 0.0),) * count
@@ -86,7 +87,7 @@ class SeveralOptions:
         if not self.find_shifts:
             return given, None
         from lumigraph.deconvolution import Exposure
-        from lumigraph.instruments import find_shifts
+        from lumigraph.metrology.scanning import find_shifts
 
         known = [Exposure.of(raw) for raw in raws]
         if self.light is not None:

@@ -1,6 +1,7 @@
 """`lumigraph sweep`: what follows from a camera's description, for every combination of some values."""
 
 import re
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -71,7 +72,7 @@ def sweep(
 
     common.check()
     files.check_output(output, (*TABLES, ".nc"))
-    given, varied = load_camera(camera), dict(map(values, vary))
+    given, varied = load_camera(anywhere(camera)), dict(map(values, vary))
     if len(varied) < len(vary):
         raise FormatError("--vary names a key twice. Give all its values at once.")
     items = combinations(varied)
@@ -80,10 +81,11 @@ def sweep(
     changed(given, items[0])  # an unknown key is refused before any work
     names = _names(measure, [row.name for row in given.quantities()])
     check_measures(given, names)
-    source = str(Path(camera).absolute()) if Path(camera).exists() else camera
     with progress("sweep") as shown, kept(output):
+        text = given.to_toml()
         found = cluster.batch(
-            Designs(source, tuple(names)), items, output, what={"camera": given.to_toml(), "measure": names},
+            Designs(text, tuple(names)), items, output,
+            what={"camera": text, "measure": names}, inputs=cluster.inputs.named_in(text),
             workers=WorkerOptions(workers).cluster(), progress=StatusPage(output, shown),
             estimated=lambda needed: line(str(needed)),
         )  # fmt: skip
@@ -95,6 +97,11 @@ def sweep(
     return _result(rows, list(varied), names, output)
 
 
+def anywhere(camera: str) -> str:
+    """A camera file by a path that does not depend on the folder, in which workers may differ; or a name."""
+    return str(Path(camera).absolute()) if Path(camera).exists() else camera
+
+
 @dataclass(frozen=True)
 class Designs:
     """Quantities of a camera with changed values.
@@ -102,7 +109,7 @@ class Designs:
     Parameters
     ----------
     camera
-        File, or a name of the catalogue.
+        Text of a camera file: what the file holds later does not matter.
     names
         Names of the quantities.
     """
@@ -113,11 +120,11 @@ class Designs:
     def __call__(self, item: Mapping[str, Any]) -> "Values":
         """The values, and the quantities or why no camera has those values."""
         from lumigraph.cluster import Values
-        from lumigraph.instruments import load_camera
+        from lumigraph.instruments.loading import camera_of
         from lumigraph.instruments.varied import changed
 
         try:
-            camera = changed(load_camera(self.camera), item)
+            camera = changed(camera_of(tomllib.loads(self.camera), "the camera file"), item)
             known = {row.name: row for row in (*camera.quantities(), *self._simulated(camera))}
         except LumigraphError as error:
             return Values({**item, _ERROR: " ".join(str(error).split())})

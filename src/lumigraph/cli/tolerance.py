@@ -12,6 +12,7 @@ from lumigraph.cli.console import line, progress
 from lumigraph.cli.options import Output
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.cli.standing import StatusPage
+from lumigraph.cli.sweep import anywhere
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
 
@@ -90,14 +91,15 @@ def tolerance(
     require_table(output)
     names = None if measure is None else [name.strip() for name in measure.split(",")]
     trials = ToleranceTrials.of(
-        check_camera(load_camera(camera)), given_tolerances(tolerance or []), names, seed=seed
+        check_camera(load_camera(anywhere(camera))), given_tolerances(tolerance or []), names, seed=seed
     )
     items = trials.items(draws)
     if hands.slurm is not None:
         return hands.submitted(output)
     with progress("tolerance") as shown, kept(output):
         found = cluster.batch(
-            trials, items, output, what=trials.what, workers=hands.cluster(), part=hands.share(),
+            trials, items, output, what=trials.what, inputs=cluster.inputs.named_in(trials.camera),
+            workers=hands.cluster(), part=hands.share(),
             progress=StatusPage(output, shown), estimated=lambda needed: line(str(needed)),
         )  # fmt: skip
     save_table(output)

@@ -30,6 +30,12 @@ class ShownOptions(RawOptions):
         Image with the lens covered: subtracted; shows which pixels are hot.
     camera
         Camera file, or a name of the catalogue, of the raw image.
+    page
+        Page of a stack of raw images, counted from 0.
+    bit_depth
+        Bits of the sensor, such as 12, where the file does not say and full pixels are to be known.
+    mosaic
+        Views, rows x columns, such as 5x5, of a picture made of blocks, one for each lenslet (ESLF).
     patch
         For a camera 2.0: size of the patches [px]; found in the raw image if left out.
     """
@@ -129,22 +135,19 @@ def view(
     if page.serve_folder:
         if beside is not None:
             raise FormatError("--serve-folder serves one folder. Leave the second file out.")
-        _serve(viewer.serve_folder(file), (file,), page, common)
+        _serve(viewer.serve_folder(file), page, common)
         return None
     exhibits = [_opened(path, origin) for path in (file, beside) if path is not None]
     if page.export is None:
-        _serve(viewer.site(exhibits), (file,) if beside is None else (file, beside), page, common)
+        _serve(viewer.site(exhibits), page, common)
         return None
     return _exported(exhibits, page, page.export)
 
 
-def _serve(site: Any, files: tuple[Path, ...], page: PageOptions, common: Common) -> None:
+def _serve(site: Any, page: PageOptions, common: Common) -> None:
     from lumigraph import viewer
 
-    viewer.serve(
-        site, port=page.port, address=viewer.address_of(files),
-        ready=lambda address: announce(address, common, no_open=page.no_open),
-    )  # fmt: skip
+    viewer.serve(site, port=page.port, ready=lambda address: announce(address, common, no_open=page.no_open))
 
 
 def _exported(exhibits: list[Any], page: PageOptions, path: Path) -> Result:
@@ -171,7 +174,14 @@ def _opened(path: Path, origin: ShownOptions) -> Any:
     from lumigraph import viewer
 
     wanted = viewer.Origin(
-        origin.calibration, origin.white, origin.dark, origin.described(), origin.patch, origin.page
+        origin.calibration,
+        origin.white,
+        origin.dark,
+        origin.described(),
+        origin.patch,
+        origin.page,
+        origin.bit_depth,
+        origin.views_of_mosaic,
     )
     with progress(f"open {path.name}") as shown:
         return viewer.open_exhibit(path, wanted, shown)

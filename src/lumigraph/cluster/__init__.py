@@ -6,12 +6,13 @@
 - `pool`: worker processes of this machine
 - `scheduler`: workers of a dask cluster
 - `slurm`: a job array
-- `ledger`: what is done, on the disk
+- `ledger`: what is done, on the disk; `entry`: what is noted of a frame
+- `inputs`: files that a job reads, as they were when it began
 """
 
-from lumigraph.cluster import slurm
+from lumigraph.cluster import inputs, slurm
+from lumigraph.cluster.entry import Entry
 from lumigraph.cluster.estimate import Estimate
-from lumigraph.cluster.ledger import LedgerEntry
 from lumigraph.cluster.run import Cluster, Local, Report, batch, page, rows, status
 from lumigraph.cluster.scheduler import Dask
 from lumigraph.cluster.task import FrameGroup, Values
@@ -19,13 +20,14 @@ from lumigraph.cluster.task import FrameGroup, Values
 __all__ = [
     "Cluster",
     "Dask",
+    "Entry",
     "Estimate",
     "FrameGroup",
-    "LedgerEntry",
     "Local",
     "Report",
     "Values",
     "batch",
+    "inputs",
     "page",
     "rows",
     "slurm",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 
-from lumigraph.cluster.ledger import LedgerEntry
+from lumigraph.cluster.entry import Entry
 from lumigraph.core import memory
 from lumigraph.errors import SamplingError
 
@@ -42,7 +42,7 @@ class Estimate:
     @classmethod
     def of(
         cls,
-        entries: Iterable[LedgerEntry],
+        entries: Iterable[Entry],
         frames: int,
         workers: int,
         *,
@@ -65,7 +65,7 @@ class Estimate:
             Time until a worker begins [s].
         """
         known = list(entries)
-        first: dict[str, LedgerEntry] = {}
+        first: dict[str, Entry] = {}
         later = [one for one in known if first.setdefault(one.where, one) is not one]
         usual = later or [min(known, key=lambda one: one.seconds)]
         seconds, busy = fmean(one.seconds for one in usual), fmean(one.busy for one in usual)

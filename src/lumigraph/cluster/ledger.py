@@ -1,7 +1,8 @@
 """Record of a job's finished frames: a folder beside its output, written by any number of processes.
 
-Each entry is a separate file, written in one step after the frame's shards, and names their checksums: it
-counts while the shards are as it says. A worker claims a frame by a lock on one byte of a file; the system
+An entry is a file of its own, written in one step after the frame's shards, with a checksum of itself and
+those of the shards: it counts while all are as it says. The files that describe the store are kept here, too,
+and put back where they differ. A worker claims a frame by a lock on one byte of a file; the system
 gives it back when the worker ends, however it ends.
 """
 
@@ -11,13 +12,15 @@ import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import lumigraph
 from lumigraph import store
+from lumigraph.cluster.entry import Entry, is_entry, is_inside, is_kind
 from lumigraph.errors import FormatError
 
 try:
@@ -25,54 +28,17 @@ try:
 except ImportError:  # Windows: two starts at once are not told apart
     fcntl = None
 
-FORMAT = 1
+FORMAT = 2
 ENDING = ".ledger"
-_DONE, _FAILED = "done", "failed"
+_DONE, _FAILED, _JOB, _STORE = "done", "failed", "job.json", "store.json"
 _LATEST, _PAUSE = 65, 10
 """Frames whose times say how fast it goes, and what is longer than the usual step by this is none."""
 
 PAGE, LINK = "status.html", "dashboard.txt"
 """A page that says how it stands, and the address of the scheduler's own."""
 
-_MEMORY = 1 << 26
-"""Bytes of a job's description that are read at most."""
-
-
-@dataclass(frozen=True, slots=True)
-class LedgerEntry:
-    """Record of a frame that is done.
-
-    Parameters
-    ----------
-    number
-        Number of the frame.
-    seconds
-        Time that it took [s].
-    memory
-        Most that its worker had held until then [bytes].
-    size
-        Size of its files [bytes].
-    where
-        Machine and process.
-    files
-        Size and CRC-32 of each file that it wrote, by its name in the output.
-    values
-        Numbers by name, of jobs that give a table.
-    notes
-        Warnings.
-    busy
-        Processor time that it took [s].
-    """
-
-    number: int
-    seconds: float = 0.0
-    memory: int = 0
-    size: int = 0
-    where: str = ""
-    files: dict[str, tuple[int, int]] = field(default_factory=dict)
-    values: dict[str, Any] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    busy: float = 0.0
+_LONGEST = 2000
+"""Characters of a reason or a warning that are shown at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,14 +66,14 @@ class Ledger:
         FormatError
             The output was begun by another command, or its inputs have changed since.
         """
-        asked = {"format": FORMAT, "what": dict(what), "items": list(items)}
+        asked = {"format": FORMAT, "version": lumigraph.__version__, "what": dict(what), "items": list(items)}
         asked = json.loads(json.dumps(asked))  # as it will be read back
-        if not (self.folder / "job.json").exists():
+        if not (self.folder / _JOB).exists():
             for name in (_DONE, _FAILED):
                 (self.folder / name).mkdir(parents=True, exist_ok=True)
-            store.write_bytes(self.folder / "job.json", json.dumps(asked).encode())
+            store.write_note(self.folder / _JOB, asked)
         begun = self.job()
-        for name in ("format", "what", "items"):
+        for name in asked:
             if begun[name] != asked[name]:
                 raise FormatError(
                     f"{self.folder} belongs to another job: {_difference(begun[name], asked[name], name)}. "
@@ -120,45 +86,113 @@ class Ledger:
         Raises
         ------
         FormatError
-            No ledger, or a damaged one.
+            No ledger, a damaged one, or one of a lumigraph that noted other things.
         """
-        path = self.folder / "job.json"
+        path = self.folder / _JOB
         try:
-            if path.stat().st_size > _MEMORY:
-                raise ValueError(f"it has {path.stat().st_size} bytes")
-            found = json.loads(path.read_bytes())
-            return {name: found[name] for name in ("format", "what", "items")}
+            found = store.read_note(path)
         except OSError:
             raise FormatError(f"{self.folder} is not the ledger of a job. Check the path.") from None
-        except (ValueError, KeyError, TypeError) as error:
-            raise FormatError(f"{path} is damaged ({error}). Remove the ledger and the output.") from None
+        except store.DamagedError as error:
+            raise FormatError(
+                f"{path} is damaged, or of another version of lumigraph. Remove the ledger and the output."
+            ) from error
+        kinds = {"format": int, "version": str, "what": dict, "items": list}
+        wrong = [
+            name for name in kinds if not is_kind(found, dict) or not is_kind(found.get(name), kinds[name])
+        ]
+        if wrong:
+            raise FormatError(f"{path} is damaged ({wrong[0]}). Remove the ledger and the output.")
+        return {name: found[name] for name in kinds}
 
     @property
     def noun(self) -> str:
         """Name of an item: a frame, or a run of as many as the job says."""
         run = self.job()["what"].get("run")
-        return f"run of {run} frames" if run else "frame"
+        return f"run of {run} frames" if is_kind(run, int) and run > 0 else "frame"
 
-    def entry(self, number: int) -> LedgerEntry | None:
-        """Entry of a frame; None if there is none, or it is incomplete."""
-        with suppress(OSError, ValueError, TypeError, AttributeError):
-            found = json.loads(self._path(_DONE, number).read_bytes())
-            found["files"] = {name: tuple(pair) for name, pair in found["files"].items()}
-            return LedgerEntry(**found)
+    def entry(self, number: int) -> Entry | None:
+        """That of a frame; None where there is none, or a damaged one."""
+        with suppress(OSError, FormatError):
+            return self._read(number)
         return None
 
-    def entries(self) -> dict[int, LedgerEntry]:
-        """All of them, by the numbers of their frames."""
+    def _read(self, number: int) -> Entry:
+        """That of a frame.
+
+        Raises
+        ------
+        DamagedError
+            It is not as it was written.
+        OSError
+            There is none.
+        """
+        path = self._path(_DONE, number)
+        found = store.read_note(path)
+        if not is_entry(found, number):
+            raise store.DamagedError(f"{path} is damaged: it is no entry of frame {number}. Remove it.")
+        return Entry(**{**found, "files": {name: tuple(pair) for name, pair in found["files"].items()}})
+
+    def entries(self) -> dict[int, Entry]:
+        """All of them, by the numbers of their frames; damaged ones are left out."""
         found = ((number, self.entry(number)) for number in self._numbers(_DONE))
         return {number: entry for number, entry in found if entry is not None}
+
+    def all_entries(self) -> dict[int, Entry]:
+        """All of them, for a table.
+
+        Raises
+        ------
+        DamagedError
+            One is not as it was written; the next start makes it again.
+        """
+        found = {}
+        for number in self._numbers(_DONE):
+            try:
+                found[number] = self._read(number)
+            except store.DamagedError as error:
+                raise store.DamagedError(f"{str(error).partition(': ')[0]}. Start the same again.") from None
+        return found
 
     def failures(self) -> dict[int, str]:
         """Why frames failed that are not done, by their numbers."""
         found = {}
         for number in self._numbers(_FAILED):
-            with suppress(OSError, ValueError, KeyError, TypeError):
-                found[number] = str(json.loads(self._path(_FAILED, number).read_bytes())["error"])
+            with suppress(OSError, FormatError, KeyError, TypeError):
+                found[number] = str(store.read_note(self._path(_FAILED, number))["error"])[:_LONGEST]
         return found
+
+    def keep_store(self, files: Mapping[str, str]) -> None:
+        """Keep the files that describe the store, by their names in it, before it takes its place."""
+        store.write_note(self.folder / _STORE, dict(files))
+
+    def mend_store(self, output: Path) -> None:
+        """Put back what describes a store where it is not as it was made.
+
+        Raises
+        ------
+        FormatError
+            What it was is not known.
+        """
+        path = self.folder / _STORE
+        try:
+            kept = store.read_note(path)
+            if not is_kind(kept, dict) or not all(
+                is_inside(name) and is_kind(kept[name], str) for name in kept
+            ):
+                raise store.DamagedError(f"{path} is damaged. Remove it.")
+        except FileNotFoundError:
+            if output.exists():
+                raise FormatError(
+                    f"{path} is missing, so nobody knows whether {output} is whole. {_ANEW}"
+                ) from None
+            return
+        except (OSError, store.DamagedError) as error:
+            raise FormatError(
+                f"{path} is damaged: nobody knows whether {output} is whole. {_ANEW}"
+            ) from error
+        for name, text in kept.items() if output.exists() else ():
+            _put(output / name, text.encode())
 
     def pace(self) -> float:
         """Frames a second by when the last ones were noted, by whatever worker; 0 while that is not known.
@@ -175,15 +209,15 @@ class Ledger:
         kept = [step for step in steps if step <= max(_PAUSE * usual, 1.0)]
         return len(kept) / sum(kept) if sum(kept) > 0 else 0.0
 
-    def record(self, entry: LedgerEntry) -> None:
+    def record(self, entry: Entry) -> None:
         """Note that a frame is done; its shards are in place."""
-        content = {name: getattr(entry, name) for name in LedgerEntry.__slots__}
-        store.write_bytes(self._path(_DONE, entry.number), json.dumps(content).encode(), flush=False)
+        content = {name: getattr(entry, name) for name in Entry.__slots__}
+        store.write_note(self._path(_DONE, entry.number), content, flush=False)
         self._path(_FAILED, entry.number).unlink(missing_ok=True)
 
     def fail(self, number: int, error: str) -> None:
         """Note why a frame failed."""
-        store.write_bytes(self._path(_FAILED, number), json.dumps({"error": error}).encode(), flush=False)
+        store.write_note(self._path(_FAILED, number), {"error": error}, flush=False)
 
     def forget(self, number: int) -> None:
         """Take back what was noted of a frame."""
@@ -219,11 +253,27 @@ class Ledger:
     def _numbers(self, kind: str) -> list[int]:
         with suppress(OSError):
             names = (entry.name.partition(".")[0] for entry in os.scandir(self.folder / kind))
-            return sorted(int(name) for name in names if name.isdecimal())
+            return sorted(
+                {int(name) for name in names if name.isascii() and name.isdecimal() and len(name) < 10}
+            )
         return []
 
     def _path(self, kind: str, number: int) -> Path:
         return self.folder / kind / f"{number:06}.json"
+
+
+_ANEW = "Remove it and its ledger, and begin anew."
+
+
+def _put(path: Path, content: bytes) -> None:
+    """Write a file that does not hold this."""
+    try:
+        if path.is_file() and path.stat().st_size == len(content) and path.read_bytes() == content:
+            return
+    except OSError:
+        pass
+    path.parent.mkdir(parents=True, exist_ok=True)
+    store.write_bytes(path, content)
 
 
 _HELD: set[tuple[str, int]] = set()
@@ -283,13 +333,16 @@ def _is_same(path: Path, descriptor: int) -> bool:
     return False
 
 
+_OF_FILES = ("size", "modified", "blake2b")
+
+
 def _difference(begun: Any, asked: Any, name: str) -> str:
     """The first place where two descriptions differ, in words."""
     if isinstance(begun, Mapping) and isinstance(asked, Mapping):
         for key in [*begun, *asked]:
             if begun.get(key) != asked.get(key):
                 found = _difference(begun.get(key), asked.get(key), key)
-                return _of_file(begun, asked) if key in ("size", "modified") and "file" in begun else found
+                return _of_file(begun, asked) if key in _OF_FILES and "file" in begun else found
     if isinstance(begun, list) and isinstance(asked, list):
         if len(begun) != len(asked):
             return f"it has {len(begun)} {name}, now {len(asked)}"
@@ -305,11 +358,18 @@ def _of_file(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
     name = Path(str(begun["file"])).name
     if begun.get("size") != asked.get("size"):
         return f"{name} had {begun.get('size')} bytes, now {asked.get('size')}"
-    when = [
-        datetime.fromtimestamp(one.get("modified", 0) / 1e9).isoformat(" ", "milliseconds")
-        for one in (begun, asked)
-    ]
+    if begun.get("modified") == asked.get("modified"):
+        return f"{name} has another content, though its size and time are the same"
+    when = [_when(one.get("modified")) for one in (begun, asked)]
     return f"{name} was modified at {when[0]}, now at {when[1]}"
+
+
+def _when(modified: Any) -> str:
+    """A time in words; what a damaged ledger says instead of one as it is."""
+    try:
+        return datetime.fromtimestamp(modified / 1e9).isoformat(" ", "milliseconds")
+    except (TypeError, ValueError, OverflowError, OSError):
+        return str(modified)[:80]
 
 
 def require_free(output: Path) -> None:
@@ -322,5 +382,5 @@ def require_free(output: Path) -> None:
     """
     if not output.parent.is_dir():
         raise FormatError(f"the folder {output.parent} for {output.name} does not exist. Make it first.")
-    if output.exists() and not (Ledger.beside(output).folder / "job.json").exists():
+    if output.exists() and not (Ledger.beside(output).folder / _JOB).exists():
         raise FormatError(f"{output} exists and has no ledger. Remove it, or give another output.")

@@ -9,8 +9,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
+from lumigraph.cluster import inputs as files
+from lumigraph.cluster.entry import Entry
 from lumigraph.cluster.estimate import Estimate, many
-from lumigraph.cluster.ledger import LINK, PAGE, Ledger, LedgerEntry, require_free
+from lumigraph.cluster.ledger import LINK, PAGE, Ledger, require_free
 from lumigraph.cluster.pool import Pool
 from lumigraph.cluster.task import BUSY, FULL, Outcome, Task, Work
 from lumigraph.core import arrays, checks
@@ -97,7 +99,7 @@ class Report:
     """
 
     count: int
-    entries: dict[int, LedgerEntry] = field(repr=False)
+    entries: dict[int, Entry] = field(repr=False)
     failures: dict[int, str] = field(repr=False)
     seconds: float = 0.0
     pace: float = 0.0
@@ -127,6 +129,7 @@ def batch(
     output: str | os.PathLike[str],
     *,
     what: Mapping[str, Any] | None = None,
+    inputs: Iterable[str | os.PathLike[str]] = (),
     workers: int | Cluster = 1,
     part: tuple[int, int] = (1, 1),
     progress: Progress = silent,
@@ -149,7 +152,10 @@ def batch(
     output
         A Zarr store, which others can open while it grows.
     what
-        Description of the work, as JSON values: a start with another one is refused.
+        What the work is, as JSON values: a start with another one is refused.
+    inputs
+        Files, or folders, that the work reads besides its items. Their size, time and hash are noted: a start
+        with another content is refused, and a frame fails while which one changed.
     workers
         Processes on this machine; or a `Dask` cluster.
     part
@@ -168,7 +174,8 @@ def batch(
     Raises
     ------
     FormatError
-        Another job has begun this output, or another start works on it.
+        Another job has begun this output, or another version of lumigraph; an input has changed since; or
+        another start works on it.
     SamplingError
         The first frames show that memory or disk do not suffice.
 
@@ -178,11 +185,14 @@ def batch(
     """
     began, output = time.perf_counter(), Path(output)
     cluster = Local(checks.whole("workers", workers)) if isinstance(workers, int) else workers
-    task = Task(work, dict(enumerate(items)), output, len(items))
+    known = files.all_known(inputs)
+    task = Task(work, dict(enumerate(items)), output, len(items), tuple(known))
     first, last = _share(part, task.count)
     require_free(output)
-    task.ledger.open(what or {}, items)
+    task.ledger.open({**(what or {}), **({"inputs": known} if known else {})}, items)
     with task.ledger.started(first, last):
+        if output.is_dir():  # a table's output is a file that is made in the end
+            task.ledger.mend_store(output)
         left = list(_left(task, first, last, progress))
         with cluster.group(task) as group:
             if left:
@@ -200,12 +210,12 @@ def rows(output: str | os.PathLike[str]) -> Iterator[list[dict[str, Any]]]:
     Raises
     ------
     FormatError
-        No job's output.
+        No job's output, or a damaged entry.
     """
     ledger = Ledger.beside(Path(output))
     ledger.job()  # refused where there is none
     with ledger.alone():
-        yield [entry.values for _, entry in sorted(ledger.entries().items())]
+        yield [entry.values for _, entry in sorted(ledger.all_entries().items())]
 
 
 def status(output: str | os.PathLike[str]) -> Report:
@@ -223,8 +233,16 @@ def status(output: str | os.PathLike[str]) -> Report:
     link, page = ledger.folder / LINK, ledger.folder / PAGE
     return Report(
         len(ledger.job()["items"]), entries, failures, pace=ledger.pace(), noun=ledger.noun,
-        link=link.read_text().strip() if link.exists() else "", page=page if page.exists() else None,
+        link=_line(link), page=page if page.exists() else None,
     )  # fmt: skip
+
+
+def _line(path: Path) -> str:
+    """The one line of a small file; empty where there is none, or it is something else."""
+    try:
+        return path.read_text().strip()[:200] if path.is_file() and path.stat().st_size < 4096 else ""
+    except (OSError, ValueError):
+        return ""
 
 
 def page(output: str | os.PathLike[str]) -> Path:
@@ -278,18 +296,18 @@ def _tried(rest: list[int], done: int, workers: int, seconds: float) -> list[int
     return [rest[(2 * k + 1) * len(rest) // (2 * count)] for k in range(count)]
 
 
-def _quickest(known: list[LedgerEntry]) -> float:
+def _quickest(known: list[Entry]) -> float:
     """Least time of a frame [s]: those that made what their worker keeps took more."""
     return min((entry.seconds for entry in known), default=math.inf)
 
 
-def _entries(task: Task, numbers: list[int]) -> list[LedgerEntry]:
+def _entries(task: Task, numbers: list[int]) -> list[Entry]:
     """Entries of the frames that did not fail."""
     return [entry for number in numbers if (entry := task.ledger.entry(number)) is not None]
 
 
 def _need(
-    task: Task, who: tuple[Cluster, Group], frames: int, known: list[LedgerEntry], starting: float,
+    task: Task, who: tuple[Cluster, Group], frames: int, known: list[Entry], starting: float,
     estimated: Callable[[Estimate], None] | None = None,
 ) -> None:  # fmt: skip
     """Tell what so many frames need, by those that are known, and refuse what cannot fit."""

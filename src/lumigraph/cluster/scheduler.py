@@ -27,7 +27,8 @@ class Dask:
     Parameters
     ----------
     address
-        Address of its scheduler, such as "tcp://10.0.0.1:8786".
+        Of its scheduler, such as "tcp://10.0.0.1:8786", or "tls://..." with dask's own configuration of
+        certificates.
     """
 
     address: str
@@ -50,9 +51,10 @@ class Dask:
             ) from None
         try:
             client = Client(self.address, timeout=_WAIT, set_as_default=False)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, TypeError, RuntimeError) as error:  # the last two: no certificates
             raise LumigraphError(
-                f"no dask scheduler answers at {self.address} ({type(error).__name__}). Check the address."
+                f"no dask scheduler answers at {self.address} ({type(error).__name__}). Check it, and "
+                "for tls:// the certificates of dask's configuration (distributed.comm.tls)."
             ) from None
         try:
             client.wait_for_workers(1, timeout=_WAIT)

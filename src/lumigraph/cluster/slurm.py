@@ -8,6 +8,7 @@ from pathlib import Path
 
 from lumigraph import store
 from lumigraph.cluster.ledger import Ledger, require_free
+from lumigraph.core.printable import has_controls, printable
 from lumigraph.errors import LumigraphError
 
 
@@ -27,8 +28,22 @@ def script(
     options
         More of sbatch's, such as ``--time=2:00:00``.
     folder
-        Folder in which the command runs; the present one if left out.
+        Where the command runs; the present one if left out.
+
+    Raises
+    ------
+    LumigraphError
+        A control character in any of them: a line break would begin a line of the script.
     """
+    where = str(folder or Path.cwd())
+    named = [("output", str(output.absolute())), ("folder", where)]
+    named += [("command", one) for one in command] + [("option of sbatch", one) for one in options]
+    for what, text in named:
+        if has_controls(text):
+            raise LumigraphError(
+                f"the {what} {printable(text)} has a control character, which no script of SLURM takes. "
+                "Give it another name."
+            )
     place = Ledger.beside(output.absolute()).folder
     heads = [
         f"--job-name=lumigraph-{output.name}",
@@ -37,7 +52,7 @@ def script(
         *options,
     ]
     lines = ["#!/bin/sh", *(f"#SBATCH {shlex.quote(head)}" for head in heads)]
-    lines += [f"cd {shlex.quote(str(folder or Path.cwd()))} || exit 1"]
+    lines += [f"cd {shlex.quote(where)} || exit 1"]
     lines += [f'exec {shlex.join(command)} "$SLURM_ARRAY_TASK_ID/{jobs}"']
     return "\n".join(lines) + "\n"
 

@@ -14,7 +14,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from lumigraph.cluster.ledger import Ledger, LedgerEntry
+from lumigraph.cluster.entry import Entry
+from lumigraph.cluster.inputs import Known, check_unchanged
+from lumigraph.cluster.ledger import Ledger
 from lumigraph.core.threads import single_products
 from lumigraph.errors import LumigraphError
 from lumigraph.io import series
@@ -89,12 +91,15 @@ class Task:
         A store of shards, beside which the ledger lies.
     count
         Items of the job.
+    inputs
+        Files that the work reads besides, as they were when the job began.
     """
 
     work: Work
     items: Mapping[int, Any]
     output: Path
     count: int
+    inputs: tuple[Known, ...] = ()
 
     @cached_property
     def ledger(self) -> Ledger:
@@ -153,10 +158,11 @@ class Task:
         raise error
 
     def _record(self, number: int, thing: Any, made: "_Cost") -> None:
+        check_unchanged(self.inputs)  # after the work: what it has read is what was noted
         with _measured() as cost:
             files, values = self._written_of(number, thing)
         notes = list(dict.fromkeys(made.notes + cost.notes))
-        self.ledger.record(LedgerEntry(
+        self.ledger.record(Entry(
             number, made.seconds + cost.seconds, peak(), sum(size for size, _ in files.values()),
             f"{platform.node()}:{os.getpid()}", files, values, notes, made.busy + cost.busy,
         ))  # fmt: skip
@@ -181,7 +187,7 @@ class Task:
         if not (self.output / "zarr.json").exists():
             with self.ledger.alone():
                 if not (self.output / "zarr.json").exists():
-                    series.create(self.output, frame, count)
+                    series.create(self.output, frame, count, self.ledger.keep_store)
         return series.write(self.output, number, frame)
 
 

@@ -76,8 +76,8 @@ class Budget:
 
 
 def shared_limit() -> int:
-    """``lumigraphMEMORY`` in MiB, or a quarter of the memory, from 256 MiB to 4 GiB [bytes]."""
-    chosen = os.environ.get("lumigraphMEMORY", "")
+    """``LUMIGRAPH_MEMORY`` in MiB, or a quarter of the memory, from 256 MiB to 4 GiB [bytes]."""
+    chosen = os.environ.get("LUMIGRAPH_MEMORY", "")
     if chosen.isdecimal():
         return int(chosen[:9]) * 2**20
     whole = memory.total()

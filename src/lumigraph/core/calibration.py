@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from lumigraph.core import checks, picture
-from lumigraph.core.drawing import draw
 from lumigraph.core.lattice import Lattice, Vector
 from lumigraph.core.lattice_offsets import LatticeOffsets
 from lumigraph.core.short_repr import brief
+from lumigraph.core.upper_floors import draw
 from lumigraph.core.warp import Warp
 from lumigraph.errors import CalibrationError
 

@@ -5,9 +5,9 @@ from typing import Any
 
 from lumigraph.core import checks, picture
 from lumigraph.core.arrays import Array, as_complex, intensity, namespace
-from lumigraph.core.drawing import draw
 from lumigraph.core.grid import Grid
 from lumigraph.core.short_repr import brief
+from lumigraph.core.upper_floors import draw
 from lumigraph.errors import GeometryError
 
 

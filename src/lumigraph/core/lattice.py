@@ -10,7 +10,8 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.errors import GeometryError
 
-Layout = Literal["square", "hex"]
+Layout = Literal["square", "hex", "rectangular"]
+LAYOUTS: tuple[Layout, ...] = ("square", "hex", "rectangular")
 Vector = tuple[float, float]
 
 
@@ -29,7 +30,7 @@ class Lattice:
     origin
         One lattice point (y, x), in the unit of the basis.
     layout
-        "square" or "hex": which neighbours a point has.
+        "square", "hex" or "rectangular" (two pitches at right angles): which neighbours a point has.
     kinds
         1, or 3 for a hexagonal array whose neighbours never have the same focal length.
 
@@ -56,8 +57,8 @@ class Lattice:
         basis = tuple(checks.pair(f"basis[{k}]", self.basis[k]) for k in range(2))
         object.__setattr__(self, "basis", basis)
         object.__setattr__(self, "origin", checks.pair("origin", self.origin))
-        if not isinstance(self.layout, str) or self.layout not in ("square", "hex"):
-            raise GeometryError(f"layout is {self.layout!r} but must be 'square' or 'hex'.")
+        if not isinstance(self.layout, str) or self.layout not in LAYOUTS:
+            raise GeometryError(f"layout is {self.layout!r} but must be 'square', 'hex' or 'rectangular'.")
         kinds = (1, 3) if self.layout == "hex" else (1,)
         if isinstance(self.kinds, bool) or not isinstance(self.kinds, int) or self.kinds not in kinds:
             raise GeometryError(f"kinds is {self.kinds!r} but must be 1, or 3 in a 'hex' layout.")
@@ -80,6 +81,23 @@ class Lattice:
         row, next_row = rotation, rotation + math.pi / 3
         basis = tuple((pitch * math.sin(angle), pitch * math.cos(angle)) for angle in (row, next_row))
         return cls((basis[0], basis[1]), origin, "hex", kinds)
+
+    @classmethod
+    def rectangular(
+        cls, pitches: tuple[float, float], rotation: float = 0.0, origin: Vector = (0.0, 0.0)
+    ) -> "Lattice":
+        """Rectangular lattice: `pitches` to the next row and along it, rows turned by `rotation` [rad].
+
+        Examples
+        --------
+        >>> Lattice.rectangular((14.0, 18.0)).pitches
+        (14.0, 18.0)
+        """
+        down, along = checks.pair("pitches", pitches)
+        for name, value in (("pitches (to the next row)", down), ("pitches (along rows)", along)):
+            checks.positive(name, value)
+        sin, cos = math.sin(rotation), math.cos(checks.finite("rotation", rotation, "rad"))
+        return cls(((along * sin, along * cos), (down * cos, -down * sin)), origin, "rectangular")
 
     @property
     def matrix(self) -> np.ndarray:

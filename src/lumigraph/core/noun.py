@@ -7,8 +7,8 @@ import numpy as np
 
 from lumigraph.core import labelled, layers
 from lumigraph.core.arrays import A, as_numpy
-from lumigraph.core.drawing import draw
 from lumigraph.core.labelled import Labels
+from lumigraph.core.upper_floors import draw
 
 if TYPE_CHECKING:
     from numpy.typing import DTypeLike

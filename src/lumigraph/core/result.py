@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lumigraph.core.printable import printable
+
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
@@ -102,7 +104,7 @@ class Result:
     thing
         Object that was made: views, a picture, a volume, a map, ...
     headline
-        Lines that people read first.
+        Lines that people read first; a line break in one of them is not one on the terminal.
     quantities
         Named values.
     figures
@@ -134,7 +136,8 @@ class Result:
     def text(self, known: Sequence[str] = ()) -> str:
         """Text for a terminal, without the notes in `known`, which were printed before."""
         notes = (f"note: {note}" for note in self.notes if note not in known)
-        return "\n".join((*self.headline, *notes, *(f"written {path}" for path in self.written)))
+        lines = (*self.headline, *notes, *(f"written {path}" for path in self.written))
+        return "\n".join(map(printable, lines))
 
     def values(self) -> dict[str, Any]:
         """Values for programs: by name, lengths in metres, intervals as name_interval."""

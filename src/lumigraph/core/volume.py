@@ -7,11 +7,11 @@ import numpy as np
 
 from lumigraph.core import checks, picture
 from lumigraph.core.arrays import A, to_numpy
-from lumigraph.core.drawing import draw
 from lumigraph.core.grid import Grid
 from lumigraph.core.labelled import Labels
 from lumigraph.core.noun import Noun
 from lumigraph.core.short_repr import brief
+from lumigraph.core.upper_floors import draw
 from lumigraph.errors import GeometryError
 
 _EVEN = 1e-6

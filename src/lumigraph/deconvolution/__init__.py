@@ -1,6 +1,7 @@
 """Deconvolution: objects from raw images and a model of the camera, a `core.linear.Linear`.
 
-- `deconvolve`: `deconvolve`; for time series `deconvolve_series`, `Deconvolver`; `run`: `RunStep`, `Interrupted`
+- `deconvolve`: `deconvolve`; for time series `deconvolve_series`, `Deconvolver`
+- `run`: `RunStep`, `Interrupted`
 - `exposure`, `problem`: what is known of the raw image; model, sensitivity and deviance
 - `methods`, `richardson_lucy`, `least_squares`: `Stop`, `RichardsonLucy`, `LeastSquares`
 - `total_variation`, `wavelets`, `filters`: priors, and `LowPass`, against artefacts of the lenslets

@@ -130,7 +130,7 @@ class Sightings:
         return y.astype(np.float32), x.astype(np.float32)
 
     def disagreements(self, sizes: np.ndarray, most: float, blurred: BlurLevels) -> np.ndarray:
-        """Disagreement (n, y, x) of lenslets if all patches have one of `sizes` (n,); see `LensletNeighbours`."""
+        """Disagreement (n, y, x) of lenslets for patches of `sizes` (n,); see `LensletNeighbours`."""
         pitch, even = self.calibration.lattice.pitch, self.flat.even
         beside = self._beside(float(np.abs(sizes).min()))
         steps = np.arange(math.ceil(_FINE * (even + 1))).astype(np.float32) / np.float32(_FINE)

@@ -4,3 +4,9 @@
 - `microscope`: light-field microscopes
 - `trade_offs`: the same quantities over a range of magnifications
 """
+
+from lumigraph.describe import microscope as _microscope  # noqa: F401 - registers itself
+from lumigraph.describe.cameras import describe
+from lumigraph.describe.trade_offs import trade_offs
+
+__all__ = ["describe", "trade_offs"]

@@ -2,27 +2,32 @@
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from functools import singledispatch
 
 from lumigraph.describe import lens_glass
 from lumigraph.design import plenoptic1 as design1
 from lumigraph.design import plenoptic2 as design2
 from lumigraph.design import resolution
 from lumigraph.errors import SamplingError
-from lumigraph.instruments.description import TRADE_OFFS, Description
-from lumigraph.instruments.row import Row
+from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.description import TRADE_OFFS, Description, Row
+from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.lenslet_camera import LensletCamera
+from lumigraph.instruments.over_field import OverField
+from lumigraph.instruments.plenoptic1 import PlenopticCamera
+from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
+from lumigraph.instruments.single_lens import SingleLensCamera
 from lumigraph.sensor import Sensor
 
-if TYPE_CHECKING:
-    from lumigraph.instruments.camera import Camera
-    from lumigraph.instruments.lenslet_camera import LensletCamera
-    from lumigraph.instruments.over_field import OverField
-    from lumigraph.instruments.plenoptic1 import PlenopticCamera
-    from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
-    from lumigraph.instruments.single_lens import SingleLensCamera
+
+@singledispatch
+def describe(instrument: Instrument) -> Description:
+    """Table of everything that follows from an instrument's description, by its kind."""
+    raise TypeError(f"nothing describes a {type(instrument).__name__}.")
 
 
-def single_lens(camera: "SingleLensCamera") -> Description:
+@describe.register
+def single_lens(camera: SingleLensCamera) -> Description:
     """The table of a camera without lenslets."""
     sections = (
         ("Geometry", tuple(_geometry(camera))),
@@ -34,7 +39,8 @@ def single_lens(camera: "SingleLensCamera") -> Description:
     return Description(_title(camera), sections, tuple(_warnings(camera)))
 
 
-def plenoptic1(camera: "PlenopticCamera") -> Description:
+@describe.register
+def plenoptic1(camera: PlenopticCamera) -> Description:
     """The table of a plenoptic camera 1.0."""
     wavelength, pitch, f = camera.wavelength, camera.lenslets.pitch, camera.lenslet_distance
     width = pitch * camera.lenslets.fill_factor
@@ -65,7 +71,8 @@ def plenoptic1(camera: "PlenopticCamera") -> Description:
     return _with_lenslets(camera, ("Directions", directions))
 
 
-def plenoptic2(camera: "FocusedPlenopticCamera") -> Description:
+@describe.register
+def plenoptic2(camera: FocusedPlenopticCamera) -> Description:
     """The table of a focused plenoptic camera 2.0."""
     wavelength, pitch, m, b = (
         camera.wavelength, camera.lenslets.pitch, camera.lenslet_magnification, camera.lenslet_distance
@@ -86,7 +93,7 @@ def plenoptic2(camera: "FocusedPlenopticCamera") -> Description:
     return _with_lenslets(camera, ("Rendered picture", rendered))
 
 
-def _with_lenslets(camera: "LensletCamera", own: tuple[str, tuple[Row, ...]]) -> Description:
+def _with_lenslets(camera: LensletCamera, own: tuple[str, tuple[Row, ...]]) -> Description:
     sections = (
         ("Geometry", (*_geometry(camera), *_distances(camera))),
         ("Main lens", tuple(_main_lens(camera))),
@@ -99,11 +106,11 @@ def _with_lenslets(camera: "LensletCamera", own: tuple[str, tuple[Row, ...]]) ->
     return Description(_title(camera), sections, (*_warnings(camera), *_lenslet_warnings(camera)))
 
 
-def _title(camera: "Camera") -> str:
+def _title(camera: Camera) -> str:
     return f"{camera.KIND} camera at {Row('', camera.wavelength, 'm').text}"
 
 
-def _geometry(camera: "Camera") -> Iterator[Row]:
+def _geometry(camera: Camera) -> Iterator[Row]:
     z1, z2 = camera.object_distance, camera.image_distance
     yield Row("wavelength", camera.wavelength, "m", "given")
     yield Row("object distance", z1, "m", "z1, given")
@@ -111,7 +118,7 @@ def _geometry(camera: "Camera") -> Iterator[Row]:
     yield Row("magnification", camera.magnification, "", "z2 / z1")
 
 
-def _distances(camera: "LensletCamera") -> Iterator[Row]:
+def _distances(camera: LensletCamera) -> Iterator[Row]:
     z2, length, built = camera.image_distance, camera.separation, camera.built
     sources = ("F = z2", "b = f_µ")
     if length != z2:
@@ -126,7 +133,7 @@ def _distances(camera: "LensletCamera") -> Iterator[Row]:
     yield Row("lenslet distance", camera.lenslet_distance, "m", f"{source}, lenslets to sensor")
 
 
-def _leaning(camera: "LensletCamera") -> Iterator[Row]:
+def _leaning(camera: LensletCamera) -> Iterator[Row]:
     lean, (y, x) = camera.lean, camera.lenslets.reach
     assert lean is not None  # asked by `_distances`
     axes = ("down", "across")
@@ -142,7 +149,7 @@ def _leaning(camera: "LensletCamera") -> Iterator[Row]:
     yield Row("lenslet distance, least", camera.lenslet_distance + min(0.0, *apart), "m", "at a corner")
 
 
-def _main_lens(camera: "Camera") -> Iterator[Row]:
+def _main_lens(camera: Camera) -> Iterator[Row]:
     wavelength, f_number = camera.wavelength, camera.f_number
     at_object = camera.object_distance / camera.pupil_diameter
     yield Row("focal length", camera.main_lens.focal_length, "m", "f, given")
@@ -163,7 +170,7 @@ def _main_lens(camera: "Camera") -> Iterator[Row]:
     yield from lens_glass.rows(camera)
 
 
-def _over_field(table: "OverField", wavelength: float) -> Iterator[Row]:
+def _over_field(table: OverField, wavelength: float) -> Iterator[Row]:
     aberrations = table.aberrations
     reach, per_wave = aberrations.reach, 1 / wavelength if aberrations.metres else 1.0
     yield Row("field of the aberrations", math.degrees(math.atan(max(reach))), "deg", "given, from the axis")
@@ -172,14 +179,14 @@ def _over_field(table: "OverField", wavelength: float) -> Iterator[Row]:
         yield Row(f"Noll {j}, most over the field", most, "waves rms", "given")
 
 
-def _diameter_source(camera: "Camera") -> str:
+def _diameter_source(camera: Camera) -> str:
     matching = getattr(camera, "matching", None)
     if camera.main_lens.diameter is not None or matching is None:
         return "D, given"
     return "D = p L / b, full micro-images" if matching == "full" else "D = z2 p / b, f-numbers matched"
 
 
-def _lenslets(camera: "LensletCamera") -> Iterator[Row]:
+def _lenslets(camera: LensletCamera) -> Iterator[Row]:
     parts, f_number = camera.lenslets, camera.lenslet_distance / camera.lenslets.pitch
     pixel = camera.pixels.pixel_pitch
     yield Row("lenslets", parts.count, "", f"{parts.layout}, {len(parts.indices())} in all")
@@ -213,7 +220,7 @@ def _lenslets(camera: "LensletCamera") -> Iterator[Row]:
     yield Row("micro-image width", camera.micro_image_width, "m", "D b / L, without diffraction")
 
 
-def _singles(camera: "LensletCamera") -> Iterator[Row]:
+def _singles(camera: LensletCamera) -> Iterator[Row]:
     parts = camera.lenslets
     for number, one in parts.single.items():
         own = parts.focal_length[0] * (1 + one.focal_change)
@@ -223,7 +230,7 @@ def _singles(camera: "LensletCamera") -> Iterator[Row]:
                 yield Row(f"lenslet {number} vertex {axis}", way, "m", "from its place on the lattice")
 
 
-def _glass(camera: "LensletCamera") -> Iterator[Row]:
+def _glass(camera: LensletCamera) -> Iterator[Row]:
     """Rows on lenslets with a surface, or whose focal length changes with the wavelength."""
     parts, surface = camera.lenslets, camera.lenslets.surface(camera.wavelength)
     if parts.abbe is not None:
@@ -238,7 +245,7 @@ def _glass(camera: "LensletCamera") -> Iterator[Row]:
         yield Row("lenslet thickness", surface.thickness, "m", "given; counts as thickness / n")
 
 
-def _sensor(camera: "Camera") -> Iterator[Row]:
+def _sensor(camera: Camera) -> Iterator[Row]:
     sensor = camera.sensor
     given = "given" if camera.pixels.shape else "all micro-images fit"
     yield Row("pixels", tuple(sensor.shape), "", given)
@@ -280,7 +287,7 @@ def readout(sensor: Sensor) -> Iterator[Row]:
         yield Row("DSNU", sensor.dsnu, "electrons", "rms of the pixels' dark signal, given")
 
 
-def _sampling(camera: "Camera") -> Iterator[Row]:
+def _sampling(camera: Camera) -> Iterator[Row]:
     sampling = camera.sampling
     for rule in sampling.rules:
         yield Row(f"largest pitch, {rule.name}", rule.pitch, "m", f"{rule.source}, margin included")
@@ -297,13 +304,13 @@ def _sampling(camera: "Camera") -> Iterator[Row]:
             yield Row(f"{name} samples", grid.shape)
 
 
-def _warnings(camera: "Camera") -> Iterator[str]:
+def _warnings(camera: Camera) -> Iterator[str]:
     for name in ("object", "pupil", "lenslet", "image"):
         try:
             getattr(camera.sampling, f"{name}_grid")
         except SamplingError as error:
             yield f"cannot be simulated: {error}"
-    yield from lens_glass.warnings(camera)
+    yield from camera.glass_warnings()
     if camera.f_number < 4:
         yield f"the main lens works at f/{camera.f_number:.3g}: below f/4 paraxial, scalar forms are rough."
     pixel, airy = camera.pixels.pixel_pitch, resolution.airy_first_zero(camera.wavelength, camera.f_number)
@@ -314,7 +321,7 @@ def _warnings(camera: "Camera") -> Iterator[str]:
         )
 
 
-def _lenslet_warnings(camera: "LensletCamera") -> Iterator[str]:
+def _lenslet_warnings(camera: LensletCamera) -> Iterator[str]:
     diameter, matched = camera.pupil_diameter, camera.matched_diameter
     if not math.isclose(diameter, matched, rel_tol=0.01):
         yield (
@@ -344,11 +351,11 @@ def _lenslet_warnings(camera: "LensletCamera") -> Iterator[str]:
     yield from _cropped(camera)
 
 
-def _smallest(camera: "LensletCamera") -> float:
+def _smallest(camera: LensletCamera) -> float:
     return design1.smallest_lenslet(camera.wavelength, camera.lenslet_distance)
 
 
-def _cropped(camera: "LensletCamera") -> Iterator[str]:
+def _cropped(camera: LensletCamera) -> Iterator[str]:
     seen, present = len(camera.calibration.indices), len(camera.lenslets.indices())
     if seen < present:
         yield f"the sensor shows {seen} micro-image centres of {present}. Leave its shape out to show all."

@@ -2,21 +2,15 @@
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.description import Row
 from lumigraph.instruments.glass import MARGIN, LensGlass
-from lumigraph.instruments.row import Row
-
-if TYPE_CHECKING:
-    from lumigraph.instruments.camera import Camera
-
-ROUND = 0.02
-"""Relative narrowing of the stop up to which there is no warning."""
 
 
-def rows(camera: "Camera") -> Iterator[Row]:
+def rows(camera: Camera) -> Iterator[Row]:
     """Rows on the source and size of the aberrations; none without a prescription."""
     glass = camera.glass
     if glass is None or camera.traced is None or camera.main_lens.prescription is None:
@@ -48,22 +42,7 @@ def rows(camera: "Camera") -> Iterator[Row]:
         )
 
 
-def warnings(camera: "Camera") -> Iterator[str]:
-    """Warnings where the glass differs from its file, or has visible effects that are not simulated."""
-    glass = camera.glass
-    if glass is None:
-        return
-    yield from (f"{note}." for note in glass.notes)
-    along, across = glass.openings.at(glass.aberrations.x[-1] / MARGIN, camera.wavelength)
-    angles = camera.pixels.angular_response is not None
-    if angles and camera.lattice is not None and min(along, across) < 1 - ROUND:
-        yield (
-            f"the stop is {along:.3g} x {across:.3g} of its width farthest out: points and slices have that, "
-            "white images a round one, as pixels respond to angles."
-        )
-
-
-def _moved(camera: "Camera", glass: LensGlass) -> float:
+def _moved(camera: Camera, glass: LensGlass) -> float:
     """Distortion at worst, on the main lens' image [px of the sensor]."""
     return _largest(glass.moved) / camera.pixels.pixel_pitch
 

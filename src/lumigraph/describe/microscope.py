@@ -1,21 +1,18 @@
 """The table of everything that follows from the description of a light-field microscope."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from lumigraph.describe.cameras import readout
+from lumigraph.describe.cameras import describe, readout
 from lumigraph.design import microscope as design
-from lumigraph.instruments.description import TRADE_OFFS, Description
-from lumigraph.instruments.row import Row
-
-if TYPE_CHECKING:
-    from lumigraph.instruments.microscope import LightFieldMicroscope
+from lumigraph.instruments.description import TRADE_OFFS, Description, Row
+from lumigraph.instruments.microscope import LightFieldMicroscope
 
 DEPTHS = (5e-6, 10e-6, 25e-6, 50e-6, 100e-6)
 """Depths for which the band limit is listed [m]."""
 
 
-def microscope(scope: "LightFieldMicroscope") -> Description:
+@describe.register
+def microscope(scope: LightFieldMicroscope) -> Description:
     """The table of a light-field microscope."""
     sections = [("Objective", tuple(_objective(scope))), ("Lenslets", tuple(_lenslets(scope)))]
     if scope.configuration == "fourier":
@@ -28,7 +25,7 @@ def microscope(scope: "LightFieldMicroscope") -> Description:
     return Description(title, tuple(sections), tuple(_warnings(scope)))
 
 
-def _objective(scope: "LightFieldMicroscope") -> Iterator[Row]:
+def _objective(scope: LightFieldMicroscope) -> Iterator[Row]:
     part, wave = scope.objective, scope.wavelength
     n, number = part.immersion_index, part.numerical_aperture
     yield Row("wavelength", wave, "m", "given")
@@ -47,7 +44,7 @@ def _objective(scope: "LightFieldMicroscope") -> Iterator[Row]:
         yield Row(f"Noll {index}", float(waves), "waves rms", "given")
 
 
-def _lenslets(scope: "LightFieldMicroscope") -> Iterator[Row]:
+def _lenslets(scope: LightFieldMicroscope) -> Iterator[Row]:
     part = scope.lenslets
     yield Row("lenslets", part.count, "", f"{part.layout}, {part.count[0] * part.count[1]} in all")
     yield Row("lenslet pitch", part.pitch, "m", "d, given")
@@ -61,7 +58,7 @@ def _lenslets(scope: "LightFieldMicroscope") -> Iterator[Row]:
     yield Row("lenslet distance", scope.lenslet_distance, "m", "b, lenslets to the sensor's conjugate plane")
 
 
-def _reconstruction(scope: "LightFieldMicroscope") -> Iterator[Row]:
+def _reconstruction(scope: LightFieldMicroscope) -> Iterator[Row]:
     M, pitch, wave = scope.magnification, scope.lenslets.pitch, scope.wavelength
     size = scope.lenslet_size
     yield Row("lenslet in object space", size, "m", "d/M: the focused plane's sampling")
@@ -81,7 +78,7 @@ def _reconstruction(scope: "LightFieldMicroscope") -> Iterator[Row]:
         )
 
 
-def _fourier(scope: "LightFieldMicroscope") -> Iterator[Row]:
+def _fourier(scope: LightFieldMicroscope) -> Iterator[Row]:
     assert scope.fourier_lens is not None  # asked by `microscope`
     M, pitch, relay = scope.magnification, scope.lenslets.pitch, scope.fourier_lens
     focal_length = scope.lenslet_distance
@@ -99,7 +96,7 @@ def _fourier(scope: "LightFieldMicroscope") -> Iterator[Row]:
         )
 
 
-def _sensor(scope: "LightFieldMicroscope") -> Iterator[Row]:
+def _sensor(scope: LightFieldMicroscope) -> Iterator[Row]:
     sensor = scope.sensor
     yield Row("pixels", tuple(sensor.shape), "", "given" if scope.pixels.shape else "all micro-images fit")
     yield Row("pixel pitch", sensor.pixel_pitch, "m", "given")
@@ -109,7 +106,7 @@ def _sensor(scope: "LightFieldMicroscope") -> Iterator[Row]:
     yield Row("micro-image pitch in pixels", scope.micro_image_pitch / sensor.pixel_pitch, "px", "")
 
 
-def _warnings(scope: "LightFieldMicroscope") -> Iterator[str]:
+def _warnings(scope: LightFieldMicroscope) -> Iterator[str]:
     if scope.configuration != "fourier":
         matched = design.matched_f_number(scope.objective.numerical_aperture, scope.magnification)
         own = scope.lenslets.focal_length[0] / scope.lenslets.pitch

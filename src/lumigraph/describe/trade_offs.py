@@ -1,50 +1,34 @@
 """Trade-offs of an instrument, to first order, and how they change with its magnification."""
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from functools import singledispatch
 
 from lumigraph.design import microscope as scope_forms
 from lumigraph.design import plenoptic1, plenoptic2, resolution
-from lumigraph.instruments.row import Row
-
-if TYPE_CHECKING:
-    from lumigraph.instruments.camera import Camera
-    from lumigraph.instruments.lenslet_camera import LensletCamera
-    from lumigraph.instruments.microscope import LightFieldMicroscope
-    from lumigraph.instruments.plenoptic1 import PlenopticCamera
-    from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
-
-
-@dataclass(frozen=True, slots=True)
-class MagnificationRange:
-    """Range of magnifications of an instrument.
-
-    Parameters
-    ----------
-    label
-        Name of the magnification.
-    own
-        The instrument's.
-    ends
-        The least and the largest absolute value.
-    at
-        The instrument with another magnification.
-    """
-
-    label: str
-    own: float
-    ends: tuple[float, float]
-    at: Callable[[float], Any]
-
-    def spaced(self, count: int) -> list[float]:
-        """So many of them, in equal ratios, with the sign of the instrument's own."""
-        (low, high), sign = self.ends, math.copysign(1.0, self.own)
-        return [sign * low * (high / low) ** (k / (count - 1)) for k in range(count)]
+from lumigraph.instruments.camera import Camera
+from lumigraph.instruments.description import Row
+from lumigraph.instruments.instrument import Instrument
+from lumigraph.instruments.lenslet_camera import LensletCamera
+from lumigraph.instruments.microscope import LightFieldMicroscope
+from lumigraph.instruments.plenoptic1 import PlenopticCamera
+from lumigraph.instruments.plenoptic2 import FocusedPlenopticCamera
+from lumigraph.instruments.single_lens import SingleLensCamera
 
 
-def single_lens(camera: "Camera") -> Iterator[Row]:
+@singledispatch
+def rows(instrument: Instrument) -> Iterator[Row]:
+    """Rows of an instrument that change with its magnification, to first order."""
+    raise TypeError(f"nothing is known of trade-offs of a {type(instrument).__name__}.")
+
+
+def trade_offs(instrument: Instrument) -> tuple[Row, ...]:
+    """Rows of an instrument that change with its magnification, to first order."""
+    return tuple(rows(instrument))
+
+
+@rows.register
+def single_lens(camera: SingleLensCamera) -> Iterator[Row]:
     """Trade-offs of a camera without lenslets."""
     main = resolution.incoherent_cutoff(camera.wavelength, camera.f_number)
     cutoff = min(main, 1 / (2 * camera.pixels.pixel_pitch)) * camera.magnification
@@ -52,7 +36,8 @@ def single_lens(camera: "Camera") -> Iterator[Row]:
     yield depth_of_field(camera)
 
 
-def plenoptic(camera: "PlenopticCamera") -> Iterator[Row]:
+@rows.register
+def plenoptic(camera: PlenopticCamera) -> Iterator[Row]:
     """Trade-offs of a plenoptic camera 1.0."""
     pitch, main = camera.lenslets.pitch, resolution.incoherent_cutoff(camera.wavelength, camera.f_number)
     pixels = camera.micro_image_pitch / camera.pixels.pixel_pitch
@@ -67,7 +52,8 @@ def plenoptic(camera: "PlenopticCamera") -> Iterator[Row]:
     yield depth_of_field(camera)
 
 
-def focused(camera: "FocusedPlenopticCamera") -> Iterator[Row]:
+@rows.register
+def focused(camera: FocusedPlenopticCamera) -> Iterator[Row]:
     """Trade-offs of a focused plenoptic camera 2.0."""
     wave, pitch, pixel = camera.wavelength, camera.lenslets.pitch, camera.pixels.pixel_pitch
     m, b = camera.lenslet_magnification, camera.lenslet_distance
@@ -86,7 +72,13 @@ def focused(camera: "FocusedPlenopticCamera") -> Iterator[Row]:
     yield depth_of_field(camera)
 
 
-def microscope(scope: "LightFieldMicroscope") -> Iterator[Row]:
+@rows.register
+def any_microscope(scope: LightFieldMicroscope) -> Iterator[Row]:
+    """Trade-offs of a microscope with lenslets at the native image or in the pupil."""
+    return fourier_microscope(scope) if scope.configuration == "fourier" else microscope(scope)
+
+
+def microscope(scope: LightFieldMicroscope) -> Iterator[Row]:
     """Trade-offs of a light-field microscope whose lenslets stand at the native image."""
     part, wave = scope.objective, scope.wavelength
     aperture, n = part.numerical_aperture, part.immersion_index
@@ -105,7 +97,7 @@ def microscope(scope: "LightFieldMicroscope") -> Iterator[Row]:
     )  # fmt: skip
 
 
-def fourier_microscope(scope: "LightFieldMicroscope") -> Iterator[Row]:
+def fourier_microscope(scope: LightFieldMicroscope) -> Iterator[Row]:
     """Trade-offs of a light-field microscope whose lenslets stand in the pupil."""
     relay, pitch = scope.fourier_lens or math.nan, scope.lenslets.pitch
     finest = scope_forms.fourier_resolution(scope.wavelength, relay, scope.magnification, pitch)
@@ -115,13 +107,13 @@ def fourier_microscope(scope: "LightFieldMicroscope") -> Iterator[Row]:
     yield _axial(scope)
 
 
-def _axial(scope: "LightFieldMicroscope") -> Row:
+def _axial(scope: LightFieldMicroscope) -> Row:
     part = scope.objective
     value = scope_forms.axial_resolution(scope.wavelength, part.numerical_aperture, part.immersion_index)
     return Row("axial resolution", value, "m", "λ / (n - sqrt(n² - NA²)), of the objective")
 
 
-def depth_of_field(camera: "Camera") -> Row:
+def depth_of_field(camera: Camera) -> Row:
     """Row of the whole aperture's depth of field."""
     at_object = camera.object_distance / camera.pupil_diameter
     value = resolution.depth_of_field(camera.wavelength, at_object)
@@ -133,10 +125,10 @@ def _resolved(cutoff: float, equation: str) -> Iterator[Row]:
     yield Row("picture cut-off at the object", cutoff, "1/m", equation)
 
 
-def _width(camera: "LensletCamera") -> float:
+def _width(camera: LensletCamera) -> float:
     return camera.lenslets.pitch * camera.lenslets.fill_factor
 
 
-def _cross_talk(camera: "LensletCamera") -> Row:
+def _cross_talk(camera: LensletCamera) -> Row:
     smallest = plenoptic1.smallest_lenslet(camera.wavelength, camera.lenslet_distance)
     return Row("cross-talk", smallest / _width(camera), "", "sqrt(2.44 λ b) / d: above 1 micro-images mix")

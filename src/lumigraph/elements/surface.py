@@ -70,6 +70,16 @@ class GlassSurface:
         heights = np.hypot(half, at)
         return float(half * np.mean(self._rays(heights, focal_length)[0] / heights))
 
+    def curved(self, squared: np.ndarray, focal_length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Sagitta [m], and the normal's cosines along the axis and, over the height, across it [1/m].
+
+        Of a curved side that faces the sensor, by the squared distance from the axis.
+        """
+        radius = (self.index - 1) * focal_length
+        root = np.sqrt(radius**2 - (1 + self.conic) * squared)
+        cosine = root / np.sqrt(root**2 + squared)
+        return squared / (radius + root), cosine, cosine / root
+
     def check(self, half: float, focal_length: float) -> None:
         """Refuse square lenslets half so wide [m] as glass has no surface for, or as light does not leave.
 

@@ -16,8 +16,6 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.linear import Linear, Sum
 from lumigraph.core.progress import Progress, part
-from lumigraph.describe import lens_glass
-from lumigraph.describe.trade_offs import MagnificationRange
 from lumigraph.design import plenoptic1, resolution, thin_lens
 from lumigraph.design.layout import Layout, LensletLayout
 from lumigraph.elements import FieldPlate, LensletArray, ThinLens, Train, ZernikePlate
@@ -25,11 +23,11 @@ from lumigraph.errors import GeometryError, ParaxialWarning
 from lumigraph.instruments import parameters, point_view
 from lumigraph.instruments.glass import GlassRequest, LensGlass, first_order, glass
 from lumigraph.instruments.glass_layout import glass_layout
-from lumigraph.instruments.glass_optics import ExitPupil, Traced, behind_glass, traced
+from lumigraph.instruments.glass_optics import ExitPupil, Traced, behind_glass, glass_warnings, traced
 from lumigraph.instruments.grids import Sampling
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.making import Making
-from lumigraph.instruments.parameters import Parameter
+from lumigraph.instruments.parameters import MagnificationRange, Parameter
 from lumigraph.instruments.parts import MainLens, Pixels
 from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.quantities import Length, Wavelength
@@ -129,6 +127,14 @@ class Camera(Instrument):
         """Grid of the focused plane within the field of the sensor."""
         return self.sampling.object_grid
 
+    @cached_property
+    def point_pitch(self) -> float:
+        """Width of the area in the focused plane whose light a point of intensity 1 sends [m].
+
+        It is the pitch of `object_grid`, which the camera's own wavelength sets: `at_wavelength` keeps it.
+        """
+        return self.sampling.object_pitch
+
     @property
     def pupil_grid(self) -> Grid:
         """Samples of the main lens."""
@@ -201,6 +207,7 @@ class Camera(Instrument):
         other = self._in_light_of(wavelength)
         if self.main_lens.prescription is not None:
             vars(other).update(exit_pupil=self.exit_pupil, glass=self.glass, traced=self.traced)
+        vars(other).update(point_pitch=self.point_pitch)  # or a white point would be coloured
         return other
 
     def _in_light_of(self, wavelength: float) -> Self:
@@ -277,13 +284,18 @@ class Camera(Instrument):
             lambda m: self.replace(object_distance=focal_length * (1 + 1 / m)),
         )  # fmt: skip
 
+    def glass_warnings(self) -> tuple[str, ...]:
+        """Warnings where a prescription's glass has visible effects that are not simulated."""
+        angles = self.pixels.angular_response is not None and self.lattice is not None
+        return tuple(glass_warnings(self.glass, self.wavelength, angles=angles))
+
     def optics(self) -> CameraOptics:
         """Plain values of the camera, which operators read."""
-        for text in lens_glass.warnings(self):
+        for text in self.glass_warnings():
             warnings.warn(text, ParaxialWarning, stacklevel=2)
         thin = CameraOptics(
             self.wavelength, self.object_distance, self.separation, self.pupil_diameter, self.lens_train(),
-            self.sensor, self.sampling.object_pitch, self.lenslet_array(), self.lenslet_distance,
+            self.sensor, self.point_pitch, self.lenslet_array(), self.lenslet_distance,
         )  # fmt: skip
         if self.glass is None or self.traced is None:
             return thin

@@ -1,13 +1,17 @@
 """A camera's optics behind glass: the thin lens in its exit pupil, and object space before it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lumigraph.elements import FieldPlate, ObjectSpace, ThinLens, Train, VignettedPupil, ZernikeMap
 from lumigraph.errors import GeometryError
-from lumigraph.instruments.glass import LensGlass
+from lumigraph.instruments.glass import MARGIN, LensGlass
 from lumigraph.operators import CameraOptics
+
+ROUND = 0.02
+"""Relative narrowing of the stop up to which there is no warning."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,3 +136,22 @@ def behind_glass(thin: CameraOptics, glass: LensGlass, found: Traced, pupil: Exi
         pupil_diameter=diameter, lens=Train((lens, ThinLens(m * pupil.focal_length))),
         object_pitch=m * thin.object_pitch, objects=found.objects,
     )  # fmt: skip
+
+
+def glass_warnings(glass: LensGlass | None, wavelength: float, *, angles: bool) -> Iterator[str]:
+    """Warnings where the glass differs from its file, or has visible effects that are not simulated.
+
+    Parameters
+    ----------
+    angles
+        Whether the pixels behind the lenslets respond to angles.
+    """
+    if glass is None:
+        return
+    yield from (f"{note}." for note in glass.notes)
+    along, across = glass.openings.at(glass.aberrations.x[-1] / MARGIN, wavelength)
+    if angles and min(along, across) < 1 - ROUND:
+        yield (
+            f"the stop is {along:.3g} x {across:.3g} of its width farthest out: points and slices have that, "
+            "white images a round one, as pixels respond to angles."
+        )

@@ -7,22 +7,20 @@ from typing import Any, ClassVar, Self
 
 from pydantic import ValidationError
 
+from lumigraph.core import upper_floors
 from lumigraph.core.calibration import Calibration
-from lumigraph.core.drawing import draw
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress
-from lumigraph.describe.trade_offs import MagnificationRange
 from lumigraph.design.layout import Layout, MicroscopeLayout
 from lumigraph.errors import FormatError
 from lumigraph.instruments import files
-from lumigraph.instruments.description import Description
-from lumigraph.instruments.parameters import Parameter, changes
+from lumigraph.instruments.description import Description, Row
+from lumigraph.instruments.parameters import MagnificationRange, Parameter, changes
 from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.point_view import PointImage
 from lumigraph.instruments.problems import readable
 from lumigraph.instruments.quantities import FROM_FILE
-from lumigraph.instruments.row import Row
 from lumigraph.operators.sampling.sampling_rules import SamplingRules
 from lumigraph.sensor import Sensor
 
@@ -203,11 +201,11 @@ class Instrument(CameraTable):
 
     def plot(self) -> Any:
         """A matplotlib Figure of its layout with rays: `lumigraph.plots.layout`."""
-        return draw("layout", self)
+        return upper_floors.draw("layout", self)
 
     def describe(self) -> Description:
-        """The table of everything that follows from the description."""
-        raise NotImplementedError
+        """The table of everything that follows from the description, each value with its equation."""
+        return upper_floors.describe("describe", self)
 
     def quantities(self) -> tuple[Row, ...]:
         """All that follows from the description: names, values in SI, units and equations."""
@@ -215,7 +213,7 @@ class Instrument(CameraTable):
 
     def trade_offs(self) -> tuple[Row, ...]:
         """Rows of the `quantities` that change with the magnification, to first order."""
-        raise NotImplementedError
+        return upper_floors.describe("trade_offs", self)
 
     def magnifications(self) -> MagnificationRange:
         """Range of magnifications for the trade-offs."""

@@ -382,7 +382,9 @@ class LensletCamera(CameraGradients):
         """
         pupil = self.exit_pupil
         f, scale = pupil.magnification * pupil.focal_length, pupil.magnification**2
-        seen = metric(found, source, focal_length=f, object_distance=pupil.object_distance)
+        seen = metric(
+            found, source, focal_length=f, object_distance=pupil.object_distance, wavelength=self.wavelength
+        )
         values = arrays.to_numpy(seen.values).astype(float) / scale
         return seen.replaced(values, "depth", 1 / scale)
 

@@ -11,13 +11,10 @@ from lumigraph.core import checks
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress
-from lumigraph.describe import microscope, trade_offs
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import microscope_design
-from lumigraph.instruments.description import Description
-from lumigraph.instruments.parameters import Parameter
+from lumigraph.instruments.parameters import MagnificationRange, Parameter
 from lumigraph.instruments.point_view import PointImage
-from lumigraph.instruments.row import Row
 from lumigraph.instruments.scope_with_parts import MicroscopeGradients
 from lumigraph.operators.lenslets.points import OUTSIDE
 from lumigraph.operators.microscope.building import SampledLenslets, microscope_operator, require_accuracy
@@ -270,22 +267,13 @@ class LightFieldMicroscope(MicroscopeGradients):
         """Refuse an accuracy that `operator` cannot reach, before any work."""
         require_accuracy(accuracy)
 
-    def magnifications(self) -> trade_offs.MagnificationRange:
+    def magnifications(self) -> MagnificationRange:
         """Magnifications of the objective."""
         own = self.objective.magnification
-        return trade_offs.MagnificationRange(
+        return MagnificationRange(
             "M, of the objective", own, (own / 4, own * 4),
             lambda m: self.replace(objective={"magnification": m}),
         )  # fmt: skip
-
-    def trade_offs(self) -> tuple[Row, ...]:
-        """Resolution, directions and cross-talk, to first order."""
-        fourier = self.configuration == "fourier"
-        return tuple((trade_offs.fourier_microscope if fourier else trade_offs.microscope)(self))
-
-    def describe(self) -> Description:
-        """Magnification, resolution, depth of field, directions and band limits, each with its equation."""
-        return microscope.microscope(self)
 
 
 def _numbers(depths: Sequence[float]) -> tuple[float, ...]:

@@ -1,19 +1,16 @@
 """Designer of a light-field microscope: its sliders, and the image of a point."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from lumigraph.instruments.described_microscope import DescribedMicroscope
 from lumigraph.instruments.parameters import Parameter, length, lenslets, magnified, number, pixel, wavelength
 from lumigraph.instruments.point_view import PointImage, of_operator
-
-if TYPE_CHECKING:
-    from lumigraph.instruments.microscope import LightFieldMicroscope
 
 VIEW_PIXELS = 15
 """Along a lenslet, of a point's quick view."""
 
 
-def point_view(scope: "LightFieldMicroscope", dz: float) -> PointImage:
+def point_view(scope: DescribedMicroscope, dz: float) -> PointImage:
     """Image of a point on the axis, by few lenslets, the scalar model and one wavelength."""
     if scope.configuration == "fourier":
         whole = scope.replace(sensor={"shape": None})
@@ -27,7 +24,7 @@ def point_view(scope: "LightFieldMicroscope", dz: float) -> PointImage:
     return replace(seen, lenslets=count, notes=notes)
 
 
-def parameters(scope: "LightFieldMicroscope") -> tuple[Parameter, ...]:
+def parameters(scope: DescribedMicroscope) -> tuple[Parameter, ...]:
     """Wavelength, objective, distances, lenslets, relay and pixels."""
     part, own = scope.objective, []
     for key, label, value in (

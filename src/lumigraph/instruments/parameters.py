@@ -1,6 +1,7 @@
 """Parameters of an instrument: sliders with units and ranges, and instruments from their values."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -165,3 +166,30 @@ def _checked(parameter: Parameter, value: Any) -> Any:
     if number != int(number) or not 1 <= number <= MOST_LENSLETS:
         raise FormatError(f"{name} is {number:g} but must be a whole number from 1 to {MOST_LENSLETS}.")
     return int(number)
+
+
+@dataclass(frozen=True, slots=True)
+class MagnificationRange:
+    """Range of magnifications of an instrument.
+
+    Parameters
+    ----------
+    label
+        Name of the magnification.
+    own
+        The instrument's.
+    ends
+        The least and the largest absolute value.
+    at
+        The instrument with another magnification.
+    """
+
+    label: str
+    own: float
+    ends: tuple[float, float]
+    at: Callable[[float], Any]
+
+    def spaced(self, count: int) -> list[float]:
+        """So many of them, in equal ratios, with the sign of the instrument's own."""
+        (low, high), sign = self.ends, math.copysign(1.0, self.own)
+        return [sign * low * (high / low) ** (k / (count - 1)) for k in range(count)]

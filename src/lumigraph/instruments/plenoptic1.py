@@ -7,14 +7,11 @@ from pydantic import model_validator
 
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
-from lumigraph.describe import cameras, trade_offs
 from lumigraph.design import plenoptic1, thin_lens
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import camera_pupil
-from lumigraph.instruments.description import Description
 from lumigraph.instruments.lenslet_camera import LensletCamera
 from lumigraph.instruments.parameters import Parameter, lenslets
-from lumigraph.instruments.row import Row
 from lumigraph.operators.microscope.pupil import PupilImages
 from lumigraph.simulation import plane_views
 
@@ -147,11 +144,3 @@ class PlenopticCamera(LensletCamera):
 
     def _own_parameters(self) -> tuple[Parameter, ...]:
         return lenslets(self.lenslets, layouts=True)
-
-    def trade_offs(self) -> tuple[Row, ...]:
-        """Resolution, depth of field and views, to first order."""
-        return tuple(trade_offs.plenoptic(self))
-
-    def describe(self) -> Description:
-        """Distances, f-numbers, cut-offs, directions and sampling, each with its equation."""
-        return cameras.plenoptic1(self)

@@ -4,14 +4,11 @@ from typing import ClassVar
 
 from pydantic import model_validator
 
-from lumigraph.describe import cameras, trade_offs
 from lumigraph.design import plenoptic2 as closed_forms
 from lumigraph.design import thin_lens
 from lumigraph.errors import FormatError, GeometryError
-from lumigraph.instruments.description import Description
 from lumigraph.instruments.lenslet_camera import LensletCamera
-from lumigraph.instruments.parameters import Parameter, choice, lenslets, number
-from lumigraph.instruments.row import Row
+from lumigraph.instruments.parameters import MagnificationRange, Parameter, choice, lenslets, number
 
 
 class FocusedPlenopticCamera(LensletCamera):
@@ -178,18 +175,10 @@ class FocusedPlenopticCamera(LensletCamera):
             *lenslets(self.lenslets, layouts=len(self.lenslets.focal_length) == 1),
         )
 
-    def magnifications(self) -> trade_offs.MagnificationRange:
+    def magnifications(self) -> MagnificationRange:
         """Magnifications of the lenslets."""
         m = self.lenslet_magnification
         ends = (min(0.05, m), max(1.5, m)) if m > 0 else (min(0.05, -m), max(0.95, -m))
-        return trade_offs.MagnificationRange(
+        return MagnificationRange(
             "|m| = b/|a|, of the lenslets", m, ends, lambda m: self.replace(lenslets={"magnification": m})
         )
-
-    def trade_offs(self) -> tuple[Row, ...]:
-        """Resolution, depth of field and views, to first order."""
-        return tuple(trade_offs.focused(self))
-
-    def describe(self) -> Description:
-        """Distances, f-numbers, cut-offs, views and sampling, each with its equation."""
-        return cameras.plenoptic2(self)

@@ -11,15 +11,12 @@ from lumigraph.core import checks
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Linear, stack
 from lumigraph.core.progress import part
-from lumigraph.describe import cameras, trade_offs
 from lumigraph.design import resolution
 from lumigraph.elements import Train
 from lumigraph.errors import FormatError, GeometryError, SamplingError, SamplingWarning
 from lumigraph.instruments import grids
 from lumigraph.instruments.angular import refuse_angles
-from lumigraph.instruments.description import Description
 from lumigraph.instruments.making import Making
-from lumigraph.instruments.row import Row
 from lumigraph.instruments.with_parts import CameraGradients
 from lumigraph.operators import CameraOptics, single_lens_operator
 from lumigraph.operators.single_lens import FINEST
@@ -129,14 +126,6 @@ class SingleLensCamera(CameraGradients):
             maps.append(_warned(single_lens_operator(optics, grid, dz, making.accuracy), dz, making.accuracy))
             part(making.progress, number, len(planes))(1.0)
         return maps[0] if depths is None else stack(maps, depths=depths)
-
-    def trade_offs(self) -> tuple[Row, ...]:
-        """Resolution, depth of field and views, to first order."""
-        return tuple(trade_offs.single_lens(self))
-
-    def describe(self) -> Description:
-        """Distances, f-numbers, cut-offs and sampling, each with its equation."""
-        return cameras.single_lens(self)
 
 
 def _warned(operator: Linear, dz: float, accuracy: float) -> Linear:

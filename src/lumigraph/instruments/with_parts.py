@@ -24,7 +24,9 @@ class CameraGradients(VolumeGradients, Camera):
         ----------
         pairs
             (n,), cameras a little to either side of this one: by a length, the aperture, the wavelength, a
-            term of the main lens' phase. Derivatives are changes from the first to the last of each.
+            term of the main lens' phase. Derivatives are changes from the first to the last of each, whose
+            points send what a sample of its own `object_grid` does; before cameras by `at_wavelength` they
+            are as bright as before this one.
         accuracy
             Relative rms error of points' images, 1e-3 to 1e-2. Changes are less accurate: by the lenslets'
             focal length and the wavelength 0.05 to 0.15 at 1e-2, 0.03 at 3e-3.

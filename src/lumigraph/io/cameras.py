@@ -28,15 +28,30 @@ def from_cameras(data: np.ndarray, spacing: tuple[float, float] = (1.0, 1.0)) ->
     data
         Pictures.
     spacing
-        Between cameras (down, right); its mean is the unit of all lengths.
+        Between cameras (down, right); the mean of its sizes is the unit of all lengths. Below zero where the
+        first row stands lowest, or the first column farthest right.
     """
     rows, columns = data.shape[:2]
     down, right = (abs(step) or 1.0 for step in spacing)
     unit = (down + right) / 2
     pixels = Grid((data.shape[2], data.shape[3]), (unit / PIXELS, unit / PIXELS))
     aperture = Grid((rows, columns), (down, right))
-    views = np.ascontiguousarray(data[::-1, ::-1])
+    views = np.ascontiguousarray(in_order_of_views(data, spacing))
     return LightField(views, aperture, pixels, _SEPARATION * unit)
+
+
+def in_order_of_views(cameras: np.ndarray, spacing: tuple[float, float] = (1.0, 1.0)) -> np.ndarray:
+    """What there is of each camera (row, column, ...) in the order of the views (v, u, ...), as a view of it.
+
+    Parameters
+    ----------
+    cameras
+        Pictures, or anything else.
+    spacing
+        Between cameras (down, right), of which the signs count.
+    """
+    down, right = spacing
+    return cameras[:: 1 if down < 0 else -1, :: 1 if right < 0 else -1]
 
 
 def to_cameras(views: LightField) -> np.ndarray:

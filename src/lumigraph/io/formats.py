@@ -76,13 +76,20 @@ _ALL = ("RawImage", "LightField", "Volume")
 _STORED = (*_ALL, "DepthMap")
 _LYTRO = ("RawImage", "Stack", "Calibration")
 _PLANES = ("RawImage", "Stack", "Volume")
+_ARRAYS = ("RawImage", "LightField", "Stack")
+_ESLF = tuple(f"{mark}eslf.{end}" for end in ("png", "jpg", "jpeg") for mark in "_.")
 FORMATS = (
-    Format("TIFF", (".tif", ".tiff"), "tiff", _PLANES, _PLANES, ("page",)),
-    Format("Lytro ESLF", ("_eslf.png",), "eslf", ("LightField",), ("LightField",), ("views",)),
+    Format("TIFF", (".tif", ".tiff"), "tiff", _PLANES, _PLANES, ("page", "views")),
+    Format("Lytro ESLF", _ESLF[:2], "eslf", ("LightField",), ("LightField",), ("views",)),
+    Format("Lytro ESLF, JPEG", _ESLF[2:], "eslf", (), ("LightField",), ("views",)),
     Format("PNG", (".png",), "png", ("RawImage",), ("RawImage",), ("views",)),
-    Format("JPEG", (".jpg", ".jpeg"), "jpeg", (), ("RawImage",)),
+    Format("JPEG", (".jpg", ".jpeg"), "jpeg", (), ("RawImage",), ("views",)),
+    Format("BMP", (".bmp",), "bmp", (), ("RawImage",), ("views",)),
+    Format("PGM, PPM", (".pgm", ".ppm", ".pnm"), "pnm", (), ("RawImage",), ("views",)),
     Format("Zarr", (".zarr", ".zarr.zip"), "zarr", _STORED, _STORED, ("page",)),
-    Format("HDF5", (".h5", ".hdf5"), "hdf5", _ALL, (*_ALL, "Stack"), ("what",)),
+    Format("HDF5", (".h5", ".hdf5"), "hdf5", _ALL, (*_ALL, "Stack"), ("what", "axes")),
+    Format("MATLAB", (".mat",), "mat", (), (*_ALL, "Stack"), ("what", "axes")),
+    Format("NumPy", (".npy", ".npz"), "npy", (), _ARRAYS, ("what", "axes")),
     Format("PFM", (".pfm",), "pfm", ("RawImage",), ("RawImage",)),
     Format("PLY", (".ply",), "ply", ("PointCloud",), ("PointCloud",)),
     Format("Lytro", (".lfp", ".lfr", ".lfx", ".raw"), "lytro", (), _LYTRO, ("what",)),
@@ -141,6 +148,7 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     page: int | None = None,
     views: int | tuple[int, int] | None = None,
     shape: tuple[int, int] | None = None,
+    axes: str | None = None,
     max_pixels: int = MAX_PIXELS,
 ) -> N: ...
 
@@ -154,6 +162,7 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     page: int | None = None,
     views: int | tuple[int, int] | None = None,
     shape: tuple[int, int] | None = None,
+    axes: str | None = None,
     max_pixels: int = MAX_PIXELS,
 ) -> Noun: ...
 
@@ -166,6 +175,7 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     page: int | None = None,
     views: int | tuple[int, int] | None = None,
     shape: tuple[int, int] | None = None,
+    axes: str | None = None,
     max_pixels: int = MAX_PIXELS,
 ) -> Noun:
     """Content of a file or a folder of views; its ending says which format (`docs/formats.md` has the table).
@@ -180,14 +190,17 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     noun
         Required type, such as `RawImage`: anything else is refused, and type checkers know what returns.
     what
-        Part of the file, where it holds several (Lytro, HDF5): `contents` lists them.
+        Part of the file, where it holds several (Lytro, HDF5, MATLAB, NumPy): `contents` lists them.
     page
         Page of a TIFF stack, or frame of a series in Zarr; without it the pages of a TIFF file
         open as a `Stack`, or as a `Volume` where they were saved as one.
     views
-        Views (v, u) of an ESLF mosaic; one number for both.
+        Views (v, u) of a mosaic, in which each lenslet is a block of pixels (ESLF); one number for both.
     shape
         Rows and columns of the raw images, for calibration files without them (`.xml`, `.ini`).
+    axes
+        What the axes of an array by another program are, in the order stored, such as "vuyxc" or, as MATLAB
+        writes views into HDF5, "cxyuv": v, u rows and columns of views, n pictures of a stack, c colours.
     max_pixels
         Larger pictures are refused; four channels, or four values of a light field, count as one pixel.
 
@@ -212,9 +225,8 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     >>> raw.shape, raw.pixel_pitch, raw.bit_depth
     ((4, 4), 1e-06, 12)
     """
-    found = _opened(
-        source.existing(path), max_pixels, {"what": what, "page": page, "views": views, "shape": shape}
-    )
+    given = {"what": what, "page": page, "views": views, "shape": shape, "axes": axes}
+    found = _opened(source.existing(path), max_pixels, given)
     if noun is not None and not isinstance(found, noun):
         raise FormatError(f"{path} holds a {called(found)} but must hold a {called(noun)}.")
     return found
@@ -228,8 +240,11 @@ def _opened(path: Path, max_pixels: int, given: dict[str, Any]) -> Noun:
     for name in options:
         if name not in row.options:
             raise FormatError(f"{name}= means nothing for {path}, a {row.name} file. Leave it out.")
-    if row.module == "png" and options:
-        return import_module("lumigraph.io.eslf").load(path, max_pixels=max_pixels, **options)
+    if "views" in options and row.module != "eslf":
+        if "page" in options:
+            raise FormatError(f"page= and views= mean nothing together for {path}. Leave one of them out.")
+        with source.ours(path, row.name):
+            return import_module("lumigraph.io.eslf").load(path, max_pixels=max_pixels, **options)
     with source.ours(path, row.name):
         return row.imported().load(path, max_pixels=max_pixels, **options)
 

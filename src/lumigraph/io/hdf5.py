@@ -1,4 +1,8 @@
-"""HDF5: what lumigraph writes, Heidelberg light fields (datasets LF, GT_DEPTH), and any array of numbers."""
+"""HDF5: what lumigraph writes, Heidelberg light fields (datasets LF, GT_DEPTH), and any array of numbers.
+
+Files by MATLAB (`h5write`, and .mat files of version 7.3, which have a block of text in front) hold arrays in
+reverse order.
+"""
 
 import json
 from collections.abc import Iterator
@@ -6,7 +10,7 @@ from contextlib import contextmanager
 from io import FileIO
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
@@ -17,18 +21,21 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
-from lumigraph.io import header, source, target
-from lumigraph.io.cameras import from_cameras
+from lumigraph.io import arrays, header, source, target
 
 _KEY, _DATA, _VALID = "lumigraph", "data", "valid"
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 _PACKING: dict[str, Any] = {"compression": "gzip", "shuffle": True, "fletcher32": True}
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_BLOCKS = tuple(512 << k for k in range(8))  # bytes of text that may stand in front
 _MOST = 10_000  # datasets listed
 _SMALL = 64 << 20  # bytes of one chunk that may be inflated without counting first
 Noun = RawImage | LightField | Volume | Stack
 
 
-def load(path: Path, *, what: str | None = None, max_pixels: int = source.MAX_PIXELS) -> Noun:
+def load(
+    path: Path, *, what: str | None = None, axes: str | None = None, max_pixels: int = source.MAX_PIXELS
+) -> Noun:
     """Content of an HDF5 file: an object that lumigraph saved, a Heidelberg light field, or one array.
 
     Parameters
@@ -38,13 +45,16 @@ def load(path: Path, *, what: str | None = None, max_pixels: int = source.MAX_PI
     what
         Name of a dataset, where the file is by another program and holds several. Its axes say what it is:
         (y, x) or (y, x, 3) a raw image, (v, u, y, x[, c]) a light field of cameras, (n, y, x[, c]) a stack.
+    axes
+        What they are, in the order stored, such as "cxyuv", where the shape does not say.
     max_pixels
         Larger ones are refused.
 
     Raises
     ------
     FormatError
-        Not HDF5, damaged, too large, several datasets and no choice, or filters that are not read.
+        Not HDF5, damaged, too large, several datasets and no choice, several orders that the axes can have,
+        or filters that are not read.
     """
     with _reading(path) as file:
         found = _header(path, file)
@@ -52,8 +62,10 @@ def load(path: Path, *, what: str | None = None, max_pixels: int = source.MAX_PI
             valid = _values(path, _dataset(path, file, _VALID), max_pixels) if _VALID in file else None
             return _restored(_values(path, _dataset(path, file, _DATA), max_pixels), found, valid)
         name = what if what is not None else _only(path, file)
-        dataset = _dataset(path, file, name)
-        return _guessed(_values(path, dataset, max_pixels), dict(_numbers(file)))
+        dataset, known = _dataset(path, file, name), dict(_numbers(file))
+        order = _order(path, file, name, dataset, axes)
+        data = _values(path, dataset, max_pixels)
+        return arrays.as_noun(data, order, known, weighted=_is_matlab(dataset))
 
 
 def save(thing: RawImage | LightField | Volume, path: Path) -> None:
@@ -131,16 +143,23 @@ def contents(path: Path) -> list[tuple[str, str, str]]:
         found = _header(path, file)
         if found is not None:
             return [("", str(found.get("kind")), _about(_dataset(path, file, _DATA)))]
-        return [(name, _noun(each.ndim, each.shape), _about(each)) for name, each in _datasets(file)]
+        return [(name, _noun(each), _about(each)) for name, each in _datasets(file)]
 
 
 @contextmanager
 def _reading(path: Path) -> Iterator[h5py.File]:
     path = source.regular_file(path)
     with path.open("rb") as file:
-        source.check_signature(path, file.read(8), "HDF5")
+        starts = [_at(file, at) for at in (0, *_BLOCKS)]
+    if not any(start == SIGNATURE for start in starts[1:]):
+        source.check_signature(path, starts[0], "HDF5")
     with source.decoding(path, "an HDF5 file"), h5py.File(path, "r", locking=False) as file:
         yield file
+
+
+def _at(file: BinaryIO, place: int) -> bytes:
+    file.seek(place)
+    return file.read(len(SIGNATURE))
 
 
 def _header(path: Path, file: h5py.File) -> dict[str, Any] | None:
@@ -244,21 +263,25 @@ def _restored(data: np.ndarray, found: dict[str, Any], valid: np.ndarray | None)
     return header.restore_planes(data, found)
 
 
-def _guessed(data: np.ndarray, known: dict[str, float]) -> Noun:
-    """Object of an array by another program, guessed from its axes."""
-    noun = _noun(data.ndim, data.shape)
-    depth = data.dtype.itemsize * 8 if data.dtype.kind in "iu" else None
-    if noun == "RawImage":
-        return RawImage(data, bit_depth=depth, metadata=known)
-    if noun == "Stack":
-        return Stack(data, bit_depth=depth, metadata=known)
-    return from_cameras(data, (known.get("dV", 1.0), known.get("dH", 1.0)))
+def _order(path: Path, file: h5py.File, name: str, dataset: h5py.Dataset, axes: str | None) -> str:
+    """Axes of a dataset by another program."""
+    heidelberg = {"dH", "dV", "focalLength"} & set(list(file.attrs)[:200])
+    reverse = True if _is_matlab(dataset) else False if heidelberg else None
+    what = f"{name} of {path}"
+    return arrays.arrangement(what, dataset.shape, axes=axes, reverse=reverse, weighted=_is_matlab(dataset))
 
 
-def _noun(axes: int, shape: tuple[int, ...]) -> str:
-    if axes == 2 or (axes == 3 and shape[2] in (3, 4)):
-        return "RawImage"
-    return "Stack" if axes == 3 or (axes == 4 and shape[3] in (3, 4)) else "LightField"
+def _is_matlab(dataset: h5py.Dataset) -> bool:
+    """Whether MATLAB itself wrote it, by `save` with -v7.3: `h5write` leaves no mark."""
+    return "MATLAB_class" in dataset.attrs
+
+
+def _noun(dataset: h5py.Dataset) -> str:
+    try:
+        reverse = True if _is_matlab(dataset) else None
+        return arrays.noun_of(arrays.arrangement("", dataset.shape, reverse=reverse, weighted=bool(reverse)))
+    except FormatError:
+        return "array"
 
 
 def _numbers(file: h5py.File) -> Iterator[tuple[str, float]]:

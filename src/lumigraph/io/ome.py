@@ -22,6 +22,7 @@ _UNITS = {
     "nm": 1e-9, "pm": 1e-12, "Å": 1e-10,
 }  # fmt: skip
 _LONGEST = 16 << 20  # characters
+_MOST_PLANES = 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,12 +39,33 @@ class OmePlanes:
         PositionZ of the planes [m], in the order of z; empty where the text does not say.
     note
         The annotation of lumigraph; empty in files by other programs.
+    bits
+        Significant bits; None where the text does not say.
+    center
+        PositionY and X of the first plane [m]; None each where the text does not say.
+    axes
+        Letters of the axes along which there is more than one plane, the slowest first, such as "tzc".
+    places
+        Name of the file (empty for the one that holds the text) and page of each plane, in that order; empty
+        where the text does not say.
+    counts
+        Number of planes along each of the axes.
     """
 
     sizes: tuple[int, int, int]
     pitch: tuple[float | None, float | None, float | None]
     depths: tuple[float, ...]
     note: str
+    bits: int | None = None
+    center: tuple[float | None, float | None] = (None, None)
+    axes: str = ""
+    places: tuple[tuple[str, int], ...] = ()
+    counts: tuple[int, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Planes in all."""
+        return math.prod(self.counts)
 
 
 def text(
@@ -95,13 +117,20 @@ def text(
     return found.encode("ascii", "xmlcharrefreplace").decode("ascii")
 
 
-def parse(description: str) -> OmePlanes | None:
-    """Planes that an OME-XML text describes; None for any other text.
+def parse(description: str, name: str = "") -> OmePlanes | None:
+    """Planes that an OME-XML text describes of the image in a file; None for any other text.
+
+    Parameters
+    ----------
+    description
+        The text.
+    name
+        Of the file: of several images it is the first that names it, or the first.
 
     Raises
     ------
     FormatError
-        OME-XML that is damaged, or that declares entities.
+        OME-XML that is damaged, that declares entities, or that refers to the text in another file.
     """
     if "<OME" not in description[:2000]:
         return None
@@ -111,19 +140,77 @@ def parse(description: str) -> OmePlanes | None:
         root = ElementTree.fromstring(description.encode("utf-8", "replace"))
     except (ElementTree.ParseError, DefusedXmlException, ValueError, LookupError) as error:
         raise FormatError(f"its OME-XML is damaged: {error}.") from error
-    pixels = next((node for node in root.iter() if _tag(node) == "Pixels"), None)
-    if pixels is None:
+    other = next((node for node in root if _tag(node) == "BinaryOnly"), None)
+    if other is not None:
+        raise FormatError(
+            "it is one part of an OME data set whose planes are named in "
+            f"{other.get('MetadataFile', '')[:80]!r}. Open that file, or choose a plane of this one by page=."
+        )
+    images = [node for node in root.iter() if _tag(node) == "Pixels"]
+    if not images:
         return None
+    pixels = next((node for node in images if name in _names(node)), images[0])
     note = next((_note(node) for node in root.iter() if node.get("Namespace") == "lumigraph"), "")
     sizes = tuple(_size(pixels.get(f"Size{axis}", "1")) for axis in "ZCT")
     pitch = tuple(_length(pixels, f"PhysicalSize{axis}") for axis in "ZYX")
+    first = next((node for node in pixels if _tag(node) == "Plane"), None)
+    center = (
+        (None, None) if first is None else tuple(_length(first, f"Position{a}", signed=True) for a in "YX")
+    )
+    bits = pixels.get("SignificantBits")
+    axes, counts = _axes(pixels, sizes)
+    return OmePlanes(
+        (sizes[0], sizes[1], sizes[2]), (pitch[0], pitch[1], pitch[2]), _depths(pixels, sizes[0]), note,
+        None if bits is None else min(_size(bits), 64), (center[0], center[1]), axes,
+        _places(pixels, dict(zip(axes, counts, strict=True)), name, root.get("UUID", "")), counts,
+    )  # fmt: skip
+
+
+def _depths(pixels: Any, count: int) -> tuple[float, ...]:
+    """PositionZ of the planes of the first channel and time [m]; empty where one is missing."""
     places = {}
     for node in pixels:
         if _tag(node) == "Plane" and node.get("TheC", "0") == "0" and node.get("TheT", "0") == "0":
             places[_size(node.get("TheZ", "0"), 0)] = _length(node, "PositionZ", signed=True)
-    complete = sorted(places) == list(range(sizes[0])) and None not in places.values()
-    depths = tuple(float(places[k] or 0) for k in range(sizes[0])) if complete else ()
-    return OmePlanes((sizes[0], sizes[1], sizes[2]), (pitch[0], pitch[1], pitch[2]), depths, note)
+    complete = sorted(places) == list(range(count)) and None not in places.values()
+    return tuple(float(places[k] or 0) for k in range(count)) if complete else ()
+
+
+def _axes(pixels: Any, sizes: tuple[int, ...]) -> tuple[str, tuple[int, ...]]:
+    """Axes along which there are several planes, the slowest first, and how many."""
+    channel = next((node for node in pixels if _tag(node) == "Channel"), None)
+    samples = 1 if channel is None else _size(channel.get("SamplesPerPixel", "1"))
+    counts = {"z": sizes[0], "c": max(1, sizes[1] // samples), "t": sizes[2]}
+    order = pixels.get("DimensionOrder", "XYCZT").lower()[:1:-1]
+    found = [axis for axis in (order if sorted(order) == ["c", "t", "z"] else "tzc") if counts[axis] > 1]
+    return "".join(found), tuple(counts[axis] for axis in found)
+
+
+def _names(pixels: Any) -> set[str]:
+    """Names of the files that hold planes of an image."""
+    found = (node.get("FileName") for part in pixels if _tag(part) == "TiffData" for node in part)
+    return {name for name in found if name}
+
+
+def _places(pixels: Any, counts: dict[str, int], name: str, own: str) -> tuple[tuple[str, int], ...]:
+    """File and page of each plane; empty where the text does not say."""
+    total = math.prod(counts.values())
+    if total > _MOST_PLANES:
+        raise FormatError(f"its OME-XML says {total} planes, at most {_MOST_PLANES} are read. Split it.")
+    found: list[tuple[str, int] | None] = [None] * total
+    for node in pixels:
+        if _tag(node) != "TiffData":
+            continue
+        start = 0
+        for axis, count in counts.items():
+            start = start * count + min(_size(node.get(f"First{axis.upper()}", "0"), 0), count - 1)
+        page = _size(node.get("IFD", "0"), 0)
+        many = _size(node.get("PlaneCount", "1" if "IFD" in node.attrib else str(total)))
+        file = next((part for part in node if _tag(part) == "UUID"), None)
+        other = "" if file is None or (own and file.text == own) else (file.get("FileName") or "")
+        for k in range(min(many, total - start)):
+            found[start + k] = ("" if other == name else other, page + k)
+    return tuple(one for one in found if one is not None) if None not in found else ()
 
 
 def _tag(node: Any) -> str:

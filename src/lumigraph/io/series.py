@@ -6,7 +6,7 @@ numbers. Volumes become OME-Zarr with an axis of time.
 
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -118,8 +118,17 @@ class SeriesFrame:
         return {name: [list(array.shape), str(array.dtype)] for name, array in self.arrays.items()}
 
 
-def create(path: Path, first: SeriesFrame, count: int) -> None:
+def create(
+    path: Path, first: SeriesFrame, count: int, describing: Callable[[dict[str, str]], None] | None = None
+) -> None:
     """An empty store for `count` frames like the first one; complete, or not there at all.
+
+    Parameters
+    ----------
+    path, first, count
+        Of the store.
+    describing
+        Called with the files that describe it, by their names inside, before it takes its place.
 
     Raises
     ------
@@ -140,6 +149,9 @@ def create(path: Path, first: SeriesFrame, count: int) -> None:
                 compressors=[ZstdCodec(level=3, checksum=True)],
                 fill_value=np.nan if array.dtype.kind == "f" else 0, config={"write_empty_chunks": True},
             )  # fmt: skip
+        if describing is not None:
+            paths = sorted(one for one in temporary.rglob("*") if one.is_file())
+            describing({one.relative_to(temporary).as_posix(): one.read_text() for one in paths})
 
 
 def write(path: Path, number: int, frame: SeriesFrame) -> Checksums:
@@ -246,7 +258,7 @@ def described(path: Path) -> dict[str, Any]:
         found = json.loads((path / "zarr.json").read_text())["attributes"]
         if found["kind"] == KIND:
             return found
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         pass
     raise FormatError(f"{path} is not a series of frames. Check the path.")
 

@@ -36,6 +36,10 @@ _SIGNATURES = (
     (b"ply", "PLY", ".ply"),
     (b"\x89HDF\r\n\x1a\n", "HDF5", ".h5"),
     (b"\x89LFP", "Lytro", ".lfp"),
+    (b"BM", "BMP", ".bmp"),
+    *((b"P%d" % kind, "PNM", ".pgm or .ppm") for kind in range(1, 7)),
+    (b"\x93NUMPY", "NumPy", ".npy"),
+    (b"MATLAB 5.0", "MATLAB", ".mat"),
 )
 
 _MOST_LENSLETS = 1_000_000

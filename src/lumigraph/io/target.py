@@ -12,6 +12,8 @@ from lumigraph.errors import FormatError
 VIEWS = "views.json"
 """Marker of a folder of views that lumigraph wrote."""
 
+_ZARR = ("zarr.json", ".zgroup", ".zarray", ".zattrs", ".zmetadata")
+_CLUTTER = re.compile(r"\.DS_Store|\._.*|Thumbs\.db|desktop\.ini")
 _VIEW = re.compile(r"view_\d+_\d+\.(png|tif)")
 
 
@@ -49,17 +51,33 @@ def check_target(path: str | os.PathLike[str], endings: Sequence[str] = (), *, f
         raise FormatError(f"{path} is a folder. Give the name of a file.")
     if path.is_dir() and any(path.iterdir()) and not (path / "zarr.json").is_file():
         raise FormatError(f"{path} is a folder that holds no Zarr store. Choose another name.")
-    _check_foreign(path, lambda entry: entry.name == "zarr.json" or entry.is_dir())
+    _check_foreign(path, _is_zarr)
     return path
 
 
+def _is_zarr(entry: Path) -> bool:
+    """Whether an entry of a store is Zarr's: what describes it, chunks, or an array or a group inside."""
+    if entry.name in _ZARR:
+        return True
+    if not entry.is_dir() or entry.is_symlink():
+        return False
+    return entry.name == "c" or any((entry / name).is_file() for name in _ZARR)
+
+
 def _check_foreign(path: Path, ours: Callable[[Path], bool]) -> None:
-    """Refuse a folder that holds more than is replaced, as notes beside views; hidden files may go."""
+    """Refuse a folder that holds more than is replaced, as notes beside views or a folder ``.git``."""
+    if path.is_dir():
+        store.sweep(path)
     for entry in path.iterdir() if path.is_dir() else ():
-        if not (entry.name.startswith(".") or ours(entry)):
+        if not (is_clutter(entry) or ours(entry)):
             raise FormatError(
                 f"writing {path} would remove {entry.name}, which it holds too. Move that, or choose another."
             )
+
+
+def is_clutter(entry: Path) -> bool:
+    """Whether an entry of a folder may go with it: file managers leave it everywhere."""
+    return _CLUTTER.fullmatch(entry.name) is not None
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:

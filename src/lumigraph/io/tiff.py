@@ -6,6 +6,7 @@ sizes microscopy programs read. Compression: none, Deflate, PackBits; LZW and JP
 
 import json
 import logging
+from dataclasses import replace
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -20,14 +21,14 @@ from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
 from lumigraph.io import header, ome, source, target
-from lumigraph.io.tiff_pixels import pixels
+from lumigraph.io.hyperstack import Declared, declared
+from lumigraph.io.tiff_planes import PlaneReader, opened, page_of
 
 _TYPES = frozenset(f"{kind}{bits}" for kind in ("uint", "int") for bits in (8, 16, 32)) | {
     "float16",
     "float32",
     "float64",
 }
-_MOST_PAGES = 100_000
 _FIRST = 8  # byte at which pixels can begin at the earliest
 # tifffile logs what it finds odd; whoever wants that adds a handler, others get our one-line errors.
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
@@ -51,16 +52,40 @@ def load(
     with path.open("rb") as file:
         source.check_signature(path, file.read(8), "TIFF")
     with source.decoding(path, "a TIFF"), tifffile.TiffFile(path) as file:
-        count = _count(path, file)
-        if page is not None and (
-            isinstance(page, bool) or not isinstance(page, int) or not 0 <= page < count
-        ):
-            raise FormatError(f"page is {page!r} but {path} has {count}. Choose 0 ... {count - 1}.")
-        planes = ome.parse(file.pages.first.description)
-        if page is None and (count > 1 or (planes is not None and planes.note)):
-            return _pages(path, file, count, planes, max_pixels)
-        found = _single(path, _page(path, file, page or 0), max_pixels)
-        return found if page is None or planes is None else _of_stack(found, planes, count)
+        planes, told = _said(path, file, page)
+        with opened(path, file, planes, told) as reader:
+            count = reader.count
+            if page is not None and (
+                isinstance(page, bool) or not isinstance(page, int) or not 0 <= page < count
+            ):
+                raise FormatError(f"page is {page!r} but {path} has {count}. Choose 0 ... {count - 1}.")
+            if page is None and (count > 1 or (planes is not None and planes.note)):
+                return _pages(reader, planes, told, max_pixels)
+            found = _single(reader, page or 0, max_pixels)
+        return _of_stack(found, planes, told, count)
+
+
+def _said(
+    path: Path, file: tifffile.TiffFile, page: int | None
+) -> tuple[ome.OmePlanes | None, Declared | None]:
+    """What the first page says of all planes: as OME-XML, or otherwise.
+
+    A page that the file itself holds opens whatever else is missing: then nothing is said.
+    """
+    if len(file.pages) == 0:
+        return None, None
+    first = page_of(path, file, 0)
+    try:
+        planes = ome.parse(first.description, path.name)
+        told = None if planes is not None else declared(path, first)
+        if page is not None:
+            with opened(path, file, planes, told):
+                pass
+    except FormatError:
+        if page is None:
+            raise
+        return None, None
+    return planes, told if told is not None and told.count >= len(file.pages) else None
 
 
 def save(thing: RawImage | Stack | Volume, path: Path) -> None:
@@ -87,14 +112,18 @@ def contents(path: Path) -> list[tuple[str, str, str]]:
     with path.open("rb") as file:
         source.check_signature(path, file.read(8), "TIFF")
     with source.decoding(path, "a TIFF"), tifffile.TiffFile(path) as file:
-        count = _count(path, file)
+        planes, told = _said(path, file, None)
+        with opened(path, file, planes, told) as reader:
+            count = reader.count
         first = file.pages.first
         size = " x ".join(map(str, first.shape))
         if count == 1:
             return [("", "RawImage", f"{size}, {first.dtype}")]
-        planes = ome.parse(first.description)
-        noun = "Volume" if _is_volume(planes, count) else "Stack"
-        return [("", noun, f"{count} pages of {size}, {first.dtype}; page=0 ... {count - 1} opens one")]
+        noun = "Volume" if _is_volume(planes, told, count) else "Stack"
+        along = _along(planes, told, count)
+        several = f" ({along})" if along else ""
+        about = f"{count} pages{several} of {size}, {first.dtype}; page=0 ... {count - 1} opens one"
+        return [("", noun, about)]
 
 
 def count(path: Path) -> int:
@@ -103,31 +132,17 @@ def count(path: Path) -> int:
     with path.open("rb") as file:
         source.check_signature(path, file.read(8), "TIFF")
     with source.decoding(path, "a TIFF"), tifffile.TiffFile(path) as file:
-        found = _count(path, file)
-        return found if found > 1 and _page(path, file, 1).shape == _page(path, file, 0).shape else 1
+        planes, told = _said(path, file, None)
+        with opened(path, file, planes, told) as reader:
+            found = reader.count
+            return found if found > 1 and reader.page(1)[1].shape == reader.page(0)[1].shape else 1
 
 
-def _count(path: Path, file: tifffile.TiffFile) -> int:
-    """Pages of one size; a first page with smaller ones behind it counts alone."""
-    if len(file.pages) == 0:
-        raise FormatError(f"{path} is a TIFF without a picture. Copy or save it again.")
-    count = len(file.pages)
-    if count > _MOST_PAGES:
-        raise FormatError(f"{path} has {count} pages but at most {_MOST_PAGES} are read. Split it.")
-    return count
-
-
-def _page(path: Path, file: tifffile.TiffFile, index: int) -> tifffile.TiffPage:
-    image = file.pages.get(index)
-    if not isinstance(image, tifffile.TiffPage):
-        raise FormatError(f"{path} has a page of an unknown kind.")
-    return image
-
-
-def _single(path: Path, image: tifffile.TiffPage, max_pixels: int) -> RawImage:
+def _single(reader: PlaneReader, k: int, max_pixels: int) -> RawImage:
+    path, image = reader.page(k)
     _check_page(path, image, max_pixels)
     found = header.loads(image.description)
-    data = pixels(path, image, transparent=found is not None)
+    data = reader.pixels(k, transparent=found is not None)
     depth = image.bitspersample if data.dtype.kind in "iu" else None
     if found is not None and "shape" in found and data.size == np.prod(found["shape"]):
         data = data.reshape(found["shape"])
@@ -135,59 +150,102 @@ def _single(path: Path, image: tifffile.TiffPage, max_pixels: int) -> RawImage:
 
 
 def _pages(
-    path: Path, file: tifffile.TiffFile, count: int, planes: ome.OmePlanes | None, max_pixels: int
+    reader: PlaneReader, planes: ome.OmePlanes | None, told: Declared | None, max_pixels: int
 ) -> RawImage | Stack | Volume:
-    first = _page(path, file, 0)
+    path, first = reader.page(0)
+    count = reader.count
     _check_page(path, first, max_pixels)
-    if count > 1 and _page(path, file, 1).shape != first.shape:  # a picture and its thumbnails
-        return _single(path, first, max_pixels)
+    if count > 1 and reader.page(1)[1].shape != first.shape:  # a picture and its thumbnails
+        return _single(reader, 0, max_pixels)
     channels = (first.samplesperpixel,) if first.samplesperpixel > 1 else ()
     source.check_size(path, (count * first.imagelength, first.imagewidth, *channels), max_pixels)
     data = None
     for k in range(count):
-        image = _page(path, file, k)
+        place, image = reader.page(k)
         if image.shape != first.shape or image.dtype != first.dtype:
             raise FormatError(
                 f"page {k} has another size or type than the first. Choose one by page=0 ... {count - 1}."
             )
-        _check_page(path, image, max_pixels)
-        plane = pixels(path, image, transparent=planes is not None and bool(planes.note))
+        _check_page(place, image, max_pixels)
+        plane = reader.pixels(k, transparent=planes is not None and bool(planes.note))
         data = np.empty((count, *plane.shape), plane.dtype) if data is None else data
         data[k] = plane
     assert data is not None  # count is at least 1
-    return _noun(data, planes, first)
+    return _noun(data, planes, told, first)
 
 
-def _of_stack(page: RawImage, planes: ome.OmePlanes, count: int) -> RawImage:
+def _of_stack(page: RawImage, planes: ome.OmePlanes | None, told: Declared | None, count: int) -> RawImage:
     """A page with what the first one says of the whole stack."""
-    found = header.loads(planes.note)
+    found = header.loads(planes.note) if planes is not None else None
     if found is not None and found.get("kind") == "Stack":
         known = header.restore_planes(page.data[None], {**found, "positions": ()})
         assert isinstance(known, Stack)  # restore_planes goes by the kind
         return RawImage(page.data, known.pixel_pitch, known.bit_depth, metadata=known.metadata)
-    if _is_volume(planes, count) or planes.pitch[1] != planes.pitch[2]:
+    if found is not None or (planes is None and told is None):
         return page
-    return RawImage(page.data, planes.pitch[2], page.bit_depth, metadata=page.metadata)
+    about = {name: value for name, value in _about(planes, told).items() if not name.startswith("axes")}
+    depth = _bits(planes, page.bit_depth)
+    pitch = None if _is_volume(planes, told, count) and count > 1 else _pitch(planes, told)
+    return replace(page, pixel_pitch=pitch, bit_depth=depth, metadata={**page.metadata, **about})
 
 
-def _noun(data: np.ndarray, planes: ome.OmePlanes | None, first: tifffile.TiffPage) -> Stack | Volume:
+def _noun(
+    data: np.ndarray, planes: ome.OmePlanes | None, told: Declared | None, first: tifffile.TiffPage
+) -> Stack | Volume:
     found = header.loads(planes.note) if planes is not None else None
     if found is not None:
         return header.restore_planes(data, found)
-    if planes is not None and _is_volume(planes, len(data)):
-        dz, dy, dx = (value or 1.0 for value in planes.pitch)
-        depths = planes.depths or tuple((np.arange(len(data)) - len(data) // 2) * dz)
+    pitches = planes.pitch if planes is not None else told.pitch if told is not None else (None,) * 3
+    depths = planes.depths if planes is not None and planes.axes == "z" else ()
+    if _is_volume(planes, told, len(data)):
+        dz, dy, dx = (value or 1.0 for value in pitches)
+        depths = depths or tuple((np.arange(len(data)) - len(data) // 2) * dz)
         return Volume(data, Grid(data.shape[1:3], (dy, dx)), depths)
-    pitch = planes.pitch[2] if planes is not None and planes.pitch[1] == planes.pitch[2] else None
-    return Stack(data, pixel_pitch=pitch, bit_depth=first.bitspersample if data.dtype.kind in "iu" else None)
+    depth = _bits(planes, first.bitspersample) if data.dtype.kind in "iu" else None
+    axes = _along(planes, told, len(data))
+    quantity = "dz [m]" if depths else f"page ({axes})" if axes else "page"
+    return Stack(data, depths, quantity, _pitch(planes, told), depth, _about(planes, told))
 
 
-def _is_volume(planes: ome.OmePlanes | None, count: int) -> bool:
+def _pitch(planes: ome.OmePlanes | None, told: Declared | None) -> float | None:
+    """Distance of the pixels [m], where it is known and the same along both axes."""
+    pitch = planes.pitch if planes is not None else told.pitch if told is not None else (None,) * 3
+    return pitch[2] if pitch[1] == pitch[2] else None
+
+
+def _bits(planes: ome.OmePlanes | None, stored: int | None) -> int | None:
+    bits = None if planes is None else planes.bits
+    return stored if bits is None or stored is None else min(bits, stored)
+
+
+def _along(planes: ome.OmePlanes | None, told: Declared | None, count: int) -> str:
+    """Axes of the pages of a stack, the slowest first, such as "2 t x 3 z"; empty where not known."""
+    axes, sizes = (planes.axes, planes.counts) if planes is not None else ("", ())
+    axes, sizes = (told.axes, told.sizes) if told is not None else (axes, sizes)
+    if len(axes) < 2 or np.prod(sizes) != count:
+        return ""
+    return " x ".join(f"{size} {axis}" for axis, size in zip(axes, sizes, strict=True))
+
+
+def _about(planes: ome.OmePlanes | None, told: Declared | None) -> dict[str, Any]:
+    """What is kept of axes and places that a stack has no fields for."""
+    axes, sizes = (planes.axes, planes.counts) if planes is not None else ("", ())
+    axes, sizes = (told.axes, told.sizes) if told is not None else (axes, sizes)
+    found: dict[str, Any] = (
+        {"axes": f"{axes.upper()}YX", "axes_sizes": list(sizes)} if axes.strip("n") else {}
+    )
+    if planes is not None and None not in planes.center:
+        found["position"] = [*planes.depths[:1], *planes.center]
+    return found
+
+
+def _is_volume(planes: ome.OmePlanes | None, told: Declared | None, count: int) -> bool:
     if planes is None:
-        return False
+        return told is not None and told.axes == "z" and None not in told.pitch and told.count == count
     if (found := header.loads(planes.note)) is not None:
         return found.get("kind") == "Volume"
-    return None not in planes.pitch and planes.sizes[0] == count and planes.sizes[2] == 1
+    sizes, alone = planes.sizes, planes.axes in ("", "z")
+    return None not in planes.pitch and sizes[0] == count and sizes[2] == 1 and alone
 
 
 def _check_page(path: Path, image: tifffile.TiffPage, max_pixels: int) -> None:

@@ -3,7 +3,8 @@
 Read: the HCI 4D light field benchmark (`input_Cam000.png` ..., row by row from the top left; its
 `parameters.cfg` if there), the Stanford archive (`out_RR_CC_Y_X_.png`), and any names that end in two
 numbers, row and column (`view_03_05.png`). Written: `view_RR_CC.png` (`.tif` for floats) and `views.json`.
-Row 0, column 0 is the camera top left; `cameras` says how that becomes (v, u).
+Row 0, column 0 is the camera top left, unless positions in the names say where it stands: y counts down, x to
+the right. `cameras` says how that becomes (v, u).
 """
 
 import json
@@ -17,18 +18,25 @@ from typing import Any
 
 import numpy as np
 
+from lumigraph.core import memory
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import FormatError, SamplingWarning
-from lumigraph.io import header, png, source, target, tiff
-from lumigraph.io.cameras import from_cameras, to_cameras
+from lumigraph.io import bmp, header, jpeg, png, pnm, source, target, tiff
+from lumigraph.io.cameras import from_cameras, in_order_of_views, to_cameras
 
-_HCI = re.compile(r"input_Cam(\d{1,6})\.png", re.I)
-_POSITION = r"(-?\d{1,9}(?:\.\d{1,12})?)"
-_STANFORD = re.compile(rf"out_(\d{{1,4}})_(\d{{1,4}})_{_POSITION}_{_POSITION}_?\.png", re.I)
-_PLACED = re.compile(r".*?(\d{1,4})[_x\-](\d{1,4})\.(?:png|tiff?)", re.I)
+_LOADERS = {
+    "png": png.load, "tif": tiff.load, "tiff": tiff.load, "jpg": jpeg.load, "jpeg": jpeg.load,
+    "bmp": bmp.load, "ppm": pnm.load, "pgm": pnm.load, "pnm": pnm.load,
+}  # fmt: skip
+_ENDING = rf"\.(?:{'|'.join(_LOADERS)})"
+_HCI = re.compile(rf"input_Cam(\d{{1,6}}){_ENDING}", re.I)
+_POSITION = r"([+-]?\d{1,9}(?:\.\d{1,12})?(?:e[+-]?\d\d?)?)"
+_STANFORD = re.compile(rf"\D*?(\d{{1,4}})_(\d{{1,4}})_{_POSITION}_{_POSITION}_?{_ENDING}", re.I)
+_PLACED = re.compile(rf".*?(\d{{1,4}})[_x\-](\d{{1,4}}){_ENDING}", re.I)
 _MOST = 10_000  # views
+_OFF = 0.5  # of a spacing: cameras that stand farther than that from where their numbers say
 _NAMED = 3  # missing views in a warning
 _LONGEST_NUMBER = 400  # characters
 Files = dict[tuple[int, int], Path]
@@ -54,26 +62,36 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> LightField:
             f"{path} names {rows} x {columns} views but holds {len(files)}; at most {_MOST} are read: "
             "the rest is missing. Check the numbers in the names."
         )
-    data = None
+    data, cameras = None, None
     for (row, column), file in sorted(files.items()):
         picture = _picture(file, max_pixels)
         if data is None:
-            whole = (rows, columns, *picture.shape)
-            source.check_size(path, whole, max_pixels)
-            data = np.zeros(whole, picture.dtype)
+            data = _room(path, (rows, columns, *picture.shape), picture.dtype, len(files), max_pixels)
+            # Filled in the order of the views: turning a large light field round takes as much memory again.
+            cameras = in_order_of_views(data, spacing)
+        assert cameras is not None  # it is data in another order
         if picture.shape != data.shape[2:] or picture.dtype != data.dtype:
             raise FormatError(
                 f"{file} has {picture.shape} {picture.dtype} but the first view has {data.shape[2:]} "
                 f"{data.dtype}: all views must be alike."
             )
-        data[row, column] = picture
+        cameras[row, column] = picture
     assert data is not None  # _files found at least one
     there = np.zeros((rows, columns), bool)
     there[tuple(np.transpose(list(files)))] = True
-    return _without(path, _restored(path, data, spacing), there)
+    return _without(path, _restored(path, data, spacing), there, spacing)
 
 
-def _without(path: Path, views: LightField, there: np.ndarray) -> LightField:
+def _room(path: Path, shape: tuple[int, ...], dtype: np.dtype, held: int, max_pixels: int) -> np.ndarray:
+    """Zeros for all views; where most of them are there, it is their memory alone that bounds them."""
+    if 2 * held < shape[0] * shape[1] or max_pixels < source.MAX_PIXELS:
+        source.check_size(path, shape, max_pixels)
+    needed = float(np.prod(shape, dtype=float)) * dtype.itemsize
+    memory.require(needed, f"{path}: its views", "Use fewer or smaller ones.", FormatError)
+    return np.zeros(shape, dtype)
+
+
+def _without(path: Path, views: LightField, there: np.ndarray, spacing: tuple[float, float]) -> LightField:
     """The light field whose missing cameras (row, column) do not count."""
     if there.all():
         return views
@@ -85,7 +103,7 @@ def _without(path: Path, views: LightField, there: np.ndarray) -> LightField:
         SamplingWarning,
         stacklevel=2,
     )
-    valid = np.broadcast_to(there[::-1, ::-1, None, None], views.data.shape[:4])
+    valid = np.broadcast_to(in_order_of_views(there, spacing)[..., None, None], views.data.shape[:4])
     return replace(views, valid=valid)
 
 
@@ -182,13 +200,27 @@ def _files(path: Path) -> tuple[Files, tuple[float, float]]:
         return _hci(path, found), (1.0, 1.0)
     if found := [m for m in map(_STANFORD.fullmatch, names) if m]:
         return _stanford(path, found)
-    placed = {(int(m[1]), int(m[2])): path / m[0] for m in map(_PLACED.fullmatch, names) if m}
+    placed = _placed(path, [m for m in map(_PLACED.fullmatch, names) if m])
     if not placed or len(placed) > _MOST:
         raise FormatError(
             f"{path} holds no views: names such as input_Cam000.png, out_00_00_Y_X_.png or view_00_00.png."
         )
     first = min(place[0] for place in placed), min(place[1] for place in placed)
     return {(r - first[0], c - first[1]): file for (r, c), file in placed.items()}, (1.0, 1.0)
+
+
+def _placed(path: Path, found: list[re.Match[str]]) -> Files:
+    """Picture of each camera by the numbers (row, column) in its name; refused where two have the same."""
+    files: Files = {}
+    for match in found:
+        place = int(match[1]), int(match[2])
+        if place in files:
+            raise FormatError(
+                f"{path} holds two pictures of row {place[0]}, column {place[1]}: {files[place].name} and "
+                f"{match[0]}. Keep one kind in the folder."
+            )
+        files[place] = path / match[0]
+    return files
 
 
 def _hci(path: Path, found: dict[re.Match[str], Path]) -> Files:
@@ -205,32 +237,62 @@ def _hci(path: Path, found: dict[re.Match[str], Path]) -> Files:
 
 
 def _stanford(path: Path, found: list[re.Match[str]]) -> tuple[Files, tuple[float, float]]:
-    """Rows and columns as counted in the names; the positions give the spacing of the cameras."""
-    files = {(int(m[1]), int(m[2])): path / m[0] for m in found}
-    rows, columns = (max(place[k] for place in files) for k in (0, 1))
+    """Rows and columns as counted in the names, and how far the cameras stand apart (down, right), signed.
+
+    Positions are (y, x), y down and x to the right: of the archive's sets some are numbered along x, some
+    against it.
+
+    Warns
+    -----
+    SamplingWarning
+        Positions that do not follow the numbers.
+    """
     table = np.array([[float(m[k]) for k in (1, 2, 3, 4)] for m in found])
-    design = np.c_[np.ones(len(table)), table[:, :2]]
-    slopes = np.linalg.lstsq(design, table[:, 2:], rcond=None)[0]
-    down = abs(float(slopes[1, 0])) if rows else 1.0
-    right = abs(float(slopes[2, 1])) if columns else 1.0
-    return files, (down or 1.0, right or 1.0)
+    numbers, places = table[:, :2], table[:, 2:]
+    slopes = _slopes(numbers, places)
+    swapped = abs(slopes[0, 1]) > abs(slopes[0, 0]) and abs(slopes[1, 0]) > abs(slopes[1, 1])
+    files = _placed(path, found)
+    if swapped:
+        _doubt(f"{path}: the first number in its names counts columns, as the positions (y, x) say; read so")
+        files = {(column, row): file for (row, column), file in files.items()}
+        numbers, slopes = numbers[:, ::-1], slopes[::-1]
+    spacing = np.diagonal(slopes)
+    off = np.abs(places - places.mean(0) - (numbers - numbers.mean(0)) * spacing)
+    far = int((off > _OFF * np.abs(spacing)).any(1)[(spacing != 0).all()].sum()) if len(off) else 0
+    if far:
+        _doubt(
+            f"{path}: {far} of {len(found)} views stand over half a spacing from where their numbers say, by "
+            "the positions in their names. They are read by their numbers"
+        )
+    return files, (float(spacing[0]) or 1.0, float(spacing[1]) or 1.0)
+
+
+def _slopes(numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Change of the positions (y, x), in columns, with the row and with the column, in rows."""
+    design = np.c_[np.ones(len(numbers)), numbers]
+    return np.linalg.lstsq(design, places, rcond=None)[0][1:]
+
+
+def _doubt(line: str) -> None:
+    warnings.warn(f"{line}. Check the names.", SamplingWarning, stacklevel=2)
 
 
 def _picture(file: Path, max_pixels: int) -> np.ndarray:
-    load_one = png.load if file.suffix.lower() == ".png" else tiff.load
+    load_one = _LOADERS[file.suffix.lower().removeprefix(".")]
     raw = load_one(source.unlinked(file), max_pixels=max_pixels)
     if not isinstance(raw, RawImage):
         raise FormatError(f"{file} holds several pages where one view is needed.")
-    return raw.data
+    return to_numpy(raw.data)
 
 
 def _restored(path: Path, data: np.ndarray, spacing: tuple[float, float]) -> LightField:
+    """The light field of views (v, u, ...), with the lengths that `save` wrote."""
     file = source.unlinked(path / target.VIEWS)
     if not file.is_file():
-        return from_cameras(data, spacing)
+        return from_cameras(in_order_of_views(data), (abs(spacing[0]), abs(spacing[1])))
     with source.decoding(file, "the views.json of a folder of views"):
         found: Any = header.loads(file.read_text(encoding="ascii")) if file.stat().st_size < 1 << 20 else None
         if found is None or found.get("kind") != "LightField":
             raise FormatError("it was not written by lumigraph. Remove it to read the pictures alone.")
         grids = header.grid(found.get("aperture")), header.grid(found.get("lenslets"))
-        return LightField(np.ascontiguousarray(data[::-1, ::-1]), *grids, found.get("separation", 0.0))
+        return LightField(data, *grids, found.get("separation", 0.0))

@@ -17,7 +17,12 @@ from lumigraph.napari.shown import depth_beside, layer_of
 from lumigraph.napari.work import Job
 from lumigraph.preparation import decode, prepare
 
-_LAYOUTS: list[tuple[str, Any]] = [("found", None), ("square", "square"), ("hexagonal", "hex")]
+_LAYOUTS: list[tuple[str, Any]] = [
+    ("found", None),
+    ("square", "square"),
+    ("hexagonal", "hex"),
+    ("rectangular", "rectangular"),
+]
 _FOCI = 21
 
 
@@ -38,7 +43,7 @@ class Calibrate(Panel):
 
         def work(tell: Progress) -> Calibration:
             tell(Stage(0.0, "calibrating"))
-            return calibrate(white, layout, pitch)
+            return calibrate(white, layout, pitch, progress=tell)
 
         return work
 

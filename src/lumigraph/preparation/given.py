@@ -17,6 +17,8 @@ from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
 from lumigraph.io.raytrix import lens_types
+from lumigraph.preparation.beside import ReferenceImages
+from lumigraph.preparation.doubts import check_kinds
 from lumigraph.preparation.prepare import prepare
 from lumigraph.rendering import sharp_patches
 
@@ -47,12 +49,13 @@ class Given:
         """
         place = None if self.calibration is None else read_calibration(self.calibration, raw.shape)
         found = place is None and self.white is not None
-        if place is None and self.white is not None:
-            place = _on_white(self.white, _stamp(self.white))
-        white = (
-            None if self.white is None or not even else _read(self.white, _stamp(self.white), "white image")
-        )
+        white = None if self.white is None else _read(self.white, _stamp(self.white), "white image")
         dark = None if self.dark is None else _read(self.dark, _stamp(self.dark), "dark image")
+        if place is None and self.white is not None:
+            if white is not None and white.shape == raw.shape:
+                check_kinds(raw, ReferenceImages(white, dark))
+            place = _on_white(self.white, _stamp(self.white))
+        white = white if even else None
         ready = prepare(raw, place, white=white, dark=dark, **options)
         if not found or place is None:
             return ready

@@ -15,9 +15,11 @@ from lumigraph.core.arrays import Array, to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.prepared import PreparedImage, Reason, Verdicts
 from lumigraph.core.raw import RawImage
+from lumigraph.core.saturation import saturation_level
 from lumigraph.errors import CalibrationError, SamplingWarning
 from lumigraph.preparation.agreement import Described, implied
 from lumigraph.preparation.beside import ReferenceImages, above, black_plane, coloured
+from lumigraph.preparation.doubts import check_kinds, doubts_of
 from lumigraph.preparation.drift import check_drift
 from lumigraph.preparation.validity import pixel_reasons, verdicts
 from lumigraph.preparation.vignetting import vignetting
@@ -90,13 +92,16 @@ def prepare(
     beside = ReferenceImages(*(None if one is None else as_raw(one) for one in (white, dark)))
     raw = as_raw(raw)
     beside.check(raw)
+    check_kinds(raw, beside)
     found, notes = _placed(raw, calibration, beside.white, camera)
     notes += _flat(raw)
-    if doubt := beside.doubt(raw):
-        _warn(notes, doubt)
+    pitch = None if found is None else found.lattice.pitch
+    for doubt in (beside.doubt(raw), *(() if pitch is None else doubts_of(raw, beside, pitch))):
+        if doubt:
+            _warn(notes, doubt)
     reasons = pixel_reasons(raw, beside, found, _mask(mask, raw))
     lenslets = None if found is None else verdicts(reasons, found)
-    notes = (*notes, *beside.notes(raw, divide=divide), *_counted(reasons, lenslets))
+    notes = (*notes, *beside.notes(raw, divide=divide), *_full(raw), *_counted(reasons, lenslets))
     known: dict[str, Any] = {"calibration": found, "reasons": reasons, "lenslets": lenslets, "notes": notes}
     if divide:
         ready, known["divisor"] = _pictured(raw, beside)
@@ -143,6 +148,19 @@ def _flat(raw: RawImage) -> list[str]:
     if (low := values.min()) != values.max():
         return []
     return [f"all pixels of the raw image are {low:g}: there is nothing to see on it"]
+
+
+def _full(raw: RawImage) -> list[str]:
+    """A note on pixels that are full below what the numbers of the raw image can hold."""
+    level, data = saturation_level(raw), to_numpy(raw.data)
+    if level is None or data.dtype.kind not in "ui" or level >= np.iinfo(data.dtype).max:
+        return []
+    many = int((data >= level).sum())
+    return (
+        [f"{many} values are {level:.0f}, which is taken for full. Give the bit depth if it is not"]
+        if many
+        else []
+    )
 
 
 def _warn(notes: list[str], line: str) -> None:

@@ -8,6 +8,7 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.prepared import Reason, Verdicts
 from lumigraph.core.raw import RawImage
+from lumigraph.core.saturation import saturation_level
 from lumigraph.preparation.beside import ReferenceImages
 from lumigraph.rendering import hot_pixels
 
@@ -43,8 +44,8 @@ def pixel_reasons(
     if mask is not None:
         reasons[~mask] = Reason.MASKED
     values = to_numpy(raw.data)
-    if raw.bit_depth is not None:
-        full = values >= 2**raw.bit_depth - 1
+    if (level := saturation_level(raw)) is not None:
+        full = values >= level
         reasons[full if full.ndim == 2 else full.any(-1)] = Reason.SATURATED
     least = _BORDER if calibration is None else math.ceil(0.5 * calibration.lattice.pitch)
     reasons[_unread(values, least)] = Reason.DEAD

@@ -7,6 +7,7 @@
 - `zoom`: angular spectrum onto any grid, by matrix DFT or chirp-z
 - `sampling`: validity ranges and sampling rules, in closed form
 - `dropped`: what a band limit's dropped frequencies would have brought
+- `plausible`: light that left the window, waves too steep for their samples or for Fresnel's approximation
 - `window`: the window of a calculation: size, quick FFT sizes, memory
 - `pruned`: convolution without the transforms of zeros
 - `cache`: transfer functions that were built before

@@ -11,7 +11,7 @@ from lumigraph.core.arrays import Array
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.propagation import sampling
+from lumigraph.propagation import plausible, sampling
 from lumigraph.propagation.angular_spectrum import (
     angular_spectrum,
     band_limited,
@@ -90,7 +90,13 @@ class Propagate:
         if self.method != "band_limited" or abs(arrays.number(self.distance)) < SHORTEST:
             return self(field).intensity
         checks.instance("field", field, Field)
-        return band_limited_intensity(field, self.distance, self.pad, self.grid)
+        intensity = band_limited_intensity(field, self.distance, self.pad, self.grid)
+        sampling.warn(plausible.undersampled(field))
+        if self.grid is None:
+            xp, area = arrays.namespace(intensity), math.prod(field.grid.pitch)
+            power = xp.sum(intensity, axis=(-2, -1)) * area
+            sampling.warn(plausible.light_left(field, power, arrays.number(self.distance)))
+        return intensity
 
 
 def propagate(
@@ -142,7 +148,9 @@ def propagate(
     -----
     SamplingWarning
         The result is defined but aliases, light wraps round, or the band limit drops light that belongs to
-        the output; the message gives the numbers.
+        the output; without `grid`, more than 1 % of the light left the window; the Fresnel approximation
+        makes more than 1 % rms of the field wrong; a smooth wave turns too fast for its samples. The message
+        gives the numbers.
 
     References
     ----------
@@ -167,14 +175,31 @@ def propagate(
     _check_pad(pad)
     if abs(distance) < SHORTEST:  # dividing by it would overflow
         distance = 0.0
+    given = grid
     if method == "auto":
         choice = choose_method(field.grid, distance, field.wavelength, grid)
         method, pad, grid = choice.method, choice.pad, grid or field.grid
-    if arrays.is_parameter(way):
-        return _differentiable(field, way, method, pad, grid)
-    if distance == 0 and method not in ("fresnel", "zoom"):
+    if distance == 0 and method not in ("fresnel", "zoom") and not arrays.is_parameter(way):
         return _on_window(field, grid or field.grid)
-    return METHODS[method](field, distance, pad, grid)
+    if arrays.is_parameter(way):
+        found = _differentiable(field, way, method, pad, grid)
+    else:
+        found = METHODS[method](field, distance, pad, grid)
+    _check(method, field, distance, (given, found))
+    return found
+
+
+def _check(method: str, field: Field, distance: float, onto: tuple[Grid | None, Field]) -> None:
+    """Warn of what speaks against a result, on the grid that was asked for."""
+    given, found = onto
+    if method in ("fresnel", "multi_step_fresnel"):
+        reached = given if method == "fresnel" else found.grid
+        sampling.warn(plausible.beyond_paraxial(method, field, distance, reached))
+    if method == "fresnel":
+        return
+    sampling.warn(plausible.undersampled(field))
+    if given is None:
+        sampling.warn(plausible.light_left(field, found.power, distance))
 
 
 def _differentiable(field: Field, distance: Array, method: str, pad: float, grid: Grid | None) -> Field:

@@ -3,12 +3,14 @@
 - `decode`, `encode`: plenoptic 1.0 raw images to a `LightField` on their lattice, and back; `squared`,
   `pixels`, `kind_check`: hexagonal lattices onto a square grid, hot pixels, raw images of a camera 2.0
 - `views`, `paths`: views, points of view, apertures, mosaics; a point of view that moves
+- `arrangement`: views whose numbers do not say where they stand
 - `refocus`, `fourier_slice`, `sharp`, `focus_range`, `detail`: refocused pictures; one that is focused
   everywhere; how finely they are sampled
 - `focused`, `patches`, `kinds`, `super_resolution`: plenoptic 2.0 pictures, of patches of one size or many
 - `geometry`, `interpolate`: lengths in metres, rectangles of lenslets; values between samples
 """
 
+from lumigraph.rendering.arrangement import check_arrangement
 from lumigraph.rendering.decode import decode
 from lumigraph.rendering.detail import detail, finer
 from lumigraph.rendering.encode import encode
@@ -36,6 +38,7 @@ __all__ = [
     "AllInFocus",
     "all_in_focus",
     "arranged",
+    "check_arrangement",
     "decode",
     "detail",
     "encode",

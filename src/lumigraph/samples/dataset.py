@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lumigraph import io, store
-from lumigraph.cluster import Cluster, Estimate, Local, Report, batch
+from lumigraph.cluster import Cluster, Estimate, Local, Report, batch, inputs
 from lumigraph.core.arrays import WORKERS, to_numpy
 from lumigraph.core.linear import Linear
 from lumigraph.core.progress import Progress, silent
@@ -146,11 +146,11 @@ def dataset(
         A store of something else.
     """
     described = asdict(work)
-    sizes = [Path(file).stat().st_size for file in work.photographs]
-    what = {"dataset": json.loads(json.dumps(described)), "sizes": sizes, "parameters": list(PARAMETERS)}
+    what = {"dataset": json.loads(json.dumps(described)), "parameters": list(PARAMETERS)}
+    read = [*work.photographs, *(file for text in work.cameras for file in inputs.named_in(text))]
     found = batch(
-        work, list(range(count)), output, what=what, workers=workers or Local(WORKERS), part=part,
-        progress=progress, estimated=estimated,
+        work, list(range(count)), output, what=what, inputs=read,
+        workers=workers or Local(WORKERS), part=part, progress=progress, estimated=estimated,
     )  # fmt: skip
     if found.done:
         told = card(work, count, _layout(output), command)

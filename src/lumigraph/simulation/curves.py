@@ -14,6 +14,9 @@ from lumigraph.io import tables
 MOST = 40
 """Wavelengths that are tried."""
 
+_SHORTEST, _LONGEST = 1e-10, 1e-2
+"""Wavelengths of X-rays and microwaves [m]: no curve of a filter goes beyond."""
+
 FINE = 4000
 """Places on a curve, beside its own, that stand for all of it."""
 
@@ -42,12 +45,12 @@ def read(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
 def checked(
     wavelengths: Sequence[float] | np.ndarray, responses: Any, light: Sequence[float] | np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Wavelengths (n,) [m], and light times response (n, channels).
+    """Wavelengths (n,) [m], and light times response (n, channels), the largest of each channel 1.
 
     Raises
     ------
     GeometryError
-        Other lengths, wavelengths that do not rise, values below 0, or a channel that is dark.
+        Other lengths, wavelengths that do not rise or that no light has, values below 0, or a dark channel.
     """
     at, values = np.asarray(wavelengths, np.float64), np.asarray(responses, np.float64)
     values = values[:, None] if values.ndim == 1 else values
@@ -58,12 +61,28 @@ def checked(
             f"wavelengths have shape {at.shape}, responses {values.shape}, the light {lit.shape}. Give two "
             "wavelengths at least, and for each of them 1 or 3 responses and, if any, a light."
         )
-    values = values * lit[:, None]
     if not (np.isfinite(at).all() and at[0] > 0 and (np.diff(at) > 0).all()):
         raise GeometryError("the curves' wavelengths must be finite, above 0 m, and rise.")
-    if not np.isfinite(values).all() or min(values.min(), lit.min()) < 0 or values.max(0).min() <= 0:
+    if not _SHORTEST <= at[0] < at[-1] <= _LONGEST:
+        raise GeometryError(
+            f"the curves' wavelengths are {at[0]:.3g} to {at[-1]:.3g} m but must lie from {_SHORTEST:g} to "
+            f"{_LONGEST:g} m. Check the unit."
+        )
+    values = _normalised(values) * _normalised(lit[:, None])  # at any scale their product is no overflow
+    return at, _normalised(values)
+
+
+def _normalised(values: np.ndarray) -> np.ndarray:
+    """Columns (n, channels) over the largest value of each.
+
+    Raises
+    ------
+    GeometryError
+        Values that are not finite or below 0, or nothing above 0.
+    """
+    if not np.isfinite(values).all() or values.min() < 0 or values.max(0).min() <= 0:
         raise GeometryError("curves must be finite, at least 0, and above 0 somewhere in each channel.")
-    return at, values
+    return values / values.max(0)
 
 
 def few(

@@ -7,9 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lumigraph.core import arrays
 from lumigraph.errors import ParaxialWarning, SamplingWarning
 from lumigraph.operators import CameraOptics
 from lumigraph.operators.lenslets.paraxial_error import paraxial_error
+from lumigraph.operators.sampling import cells
+from lumigraph.scene import Points, Slice
 from lumigraph.simulation.camera import ImagedCamera
 
 _MEASURED = {  # by benchmarks.accuracy and estimates, over the accuracy asked: at 1e-2, 1e-3 and 1e-4
@@ -55,12 +58,49 @@ SINGLE = 1.3
 """Ratio of the error of one sample's image to that of many samples'."""
 
 
-def of_operator(intensity: np.ndarray, accuracy: float) -> ReachedError:
-    """Error of a slice's image: smaller for many samples than for few, whose errors differ."""
+LEAST_FRESNEL, MOST_BELOW = 2.75, 3.0
+"""Number p²/(λb) down to which the operator's error is that of the table, and how much more it is at most
+below, where it grows as its inverse: about 1 slices were off by 1.24 times what was asked."""
+
+
+def of_operator(intensity: np.ndarray, accuracy: float, camera: CameraOptics | None = None) -> ReachedError:
+    """Error of a slice's image: smaller for many samples than for few, larger behind slow lenslets."""
     light, squared = float(np.abs(intensity).sum()), float(np.square(intensity, dtype=float).sum())
     few = SINGLE * math.sqrt(squared) / (light or 1.0)
     found = of_quadrature("operator", accuracy)
-    return replace(found, rms=found.rms * max(1.0, few))
+    slow = 1.0 if camera is None else LEAST_FRESNEL / cells.fresnel_number(camera)
+    return replace(found, rms=found.rms * max(1.0, few) * min(max(1.0, slow), MOST_BELOW))
+
+
+TRACED = 2.5e-3
+"""Of a main lens by its prescription, whose rays are fitted by Zernike terms: relative rms beside Huygens
+sums over its rays, 1.3e-3 to 4.9e-3."""
+
+SLANTED = 0.5
+"""Relative rms of images behind lenslets of glass by the angle at which light arrives [1/rad]: coma and
+astigmatism of glass are not followed. 0.33 to 1.0 at 0.03 to 0.06 rad."""
+
+
+def beside(found: ReachedError, camera: CameraOptics, aslant: float) -> ReachedError:
+    """Error with what the camera's own model leaves out of light that arrives at an angle [rad], rms."""
+    if camera.objects is not None:
+        found = found.and_also(TRACED, ", a main lens by its rays")
+    if camera.surface is not None and camera.model == "exact":
+        found = found.and_also(SLANTED * aslant, f", glass at {aslant:.2g} rad")
+    return found
+
+
+def aslant(part: Slice | Points, camera: CameraOptics) -> float:
+    """Angle [rad], rms over its light, at which light of a part arrives at the lenslets."""
+    if isinstance(part, Points):
+        light, places = np.abs(part.intensities), part.positions
+        squared = (places[:, 0] ** 2 + places[:, 1] ** 2) / (camera.object_distance + places[:, 2]) ** 2
+    else:
+        light = np.abs(arrays.to_numpy(part.intensity))
+        squared = part.grid.y[:, None] ** 2 + part.grid.x**2
+        squared = squared / (camera.object_distance + part.dz) ** 2
+    weights = np.square(light, dtype=float)
+    return math.sqrt(float((weights * squared).sum()) / (float(weights.sum()) or 1.0))
 
 
 ROUNDING = 1.5e-6
@@ -74,8 +114,17 @@ def of_points(difference: float, accuracy: float) -> ReachedError:
     )
 
 
-def of_white(difference: float, accuracy: float) -> ReachedError:
+NARROW, MORE = 2, 12.0
+"""Lenslets along an axis up to which white images are off by more than light that is followed less far says,
+and how much more: 1 x 4 and 2 x 4 ones by 6 to 23 times."""
+
+
+def of_white(difference: float, accuracy: float, camera: CameraOptics) -> ReachedError:
     """Error of a white image, from the difference that `white.image_and_error` finds."""
+    assert camera.array is not None  # as white images before lenslets ask
+    extent = camera.array.extent or camera.sensor.grid.size
+    if min(extent) < (NARROW + 0.5) * camera.array.lattice.pitch:
+        difference *= MORE
     return ReachedError(
         difference, f"white image at accuracy {accuracy:g}, beside light that is followed less far"
     )

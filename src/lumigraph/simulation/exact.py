@@ -86,16 +86,18 @@ def _image_of(
         return _without_lenslets(camera, part, accuracy)
     if isinstance(part, Diffuser):
         image, off = white.image_and_error(plain, accuracy)
-        return part.intensity * image, error.of_white(off, accuracy).through(plain)
+        return part.intensity * image, error.of_white(off, accuracy, plain).through(plain)
     plain = resolved(plain, accuracy)
+    aslant = error.aslant(part, plain) if plain.surface is not None else 0.0
     if isinstance(part, Points):
         image, off = points.image_and_error(plain, part, accuracy)
-        reached = error.of_points(off, accuracy)
+        reached = error.beside(error.of_points(off, accuracy), plain, aslant)
         return image, reached if plain.model == "exact" else reached.through(plain)
     part = part.trimmed()
     operator = periodic_operator(plain, part.grid, part.dz, accuracy=accuracy, progress=progress)
     intensity = arrays.to_numpy(part.intensity).astype(np.float32)
-    image, reached = operator.forward(intensity), error.of_operator(intensity, accuracy)
+    image = operator.forward(intensity)
+    reached = error.beside(error.of_operator(intensity, accuracy, plain), plain, aslant)
     if plain.model == "exact":
         return image, reached.and_also(left_by_field(plain, accuracy), ", alike over the field")
     behind = operator.of if isinstance(operator, Regridded) else operator

@@ -69,7 +69,7 @@ def hidden_image(
     )
     assert isinstance(operator, PeriodicOperator)  # a paraxial one is the same over the field
     intensity = arrays.to_numpy(part.intensity).astype(np.float32)
-    reached = error.of_operator(intensity, accuracy).through(camera)
+    reached = error.beside(error.of_operator(intensity, accuracy, camera), camera, 0.0).through(camera)
     if not nearer:
         return operator.forward(intensity), reached
     told = share_of(progress, 1, 2)
@@ -85,7 +85,7 @@ def _points_image(
     free = min(screen.distance for screen in screens) - camera.object_distance >= depths
     before = Points(part.positions[free], part.intensities[free])
     whole, off = points.image_and_error(camera, before, accuracy)
-    reached = error.of_points(off, accuracy).through(camera)
+    reached = error.beside(error.of_points(off, accuracy), camera, 0.0).through(camera)
     behind, parts = np.unique(depths[~free]), np.zeros_like(whole)
     for k, dz in enumerate(behind):
         mine = depths == dz

@@ -61,7 +61,8 @@ def simulate(
 
     Light goes from each plane of the scene to the main lens, through the camera's train to the sensor,
     where its intensity is integrated over the pixels. An evenly lit, wide scene of intensity 1 gives a mean
-    of about 1; a point of intensity 1 counts as one sample of ``camera.object_grid``.
+    of about 1; a point of intensity 1 counts as one sample of ``camera.object_grid``, at all wavelengths of a
+    spectrum.
 
     Depths add up, and slices with an opacity hide what stands behind them, before cameras with lenslets and
     in incoherent light: each point that their edges hide in part sends its own wave past them (Kirchhoff's

@@ -12,6 +12,10 @@ from lumigraph.simulation import error
 from lumigraph.simulation.camera import ImagedCamera
 from lumigraph.simulation.coherence import Coherence, Incoherent, PartiallyCoherent
 
+FEW = 3
+"""Shots in a block, from which on their error falls as that of many does: 16 tilted waves in blocks of two
+were off by 0.12 where 0.08 was stated."""
+
 
 @dataclass(slots=True)
 class Shots:
@@ -68,6 +72,8 @@ class Shots:
         """
         n, squared = sum(self.drawn), error.norm(self.total) ** 2
         spread = max(0.0, n * self.squares - squared)
+        if n < FEW * len(self.drawn):  # so few quasi-random ones err no less than random ones
+            power = min(power, 0.5)
         return math.sqrt(spread / (len(self.drawn) ** (2 * power) - 1) / max(squared, np.finfo(float).tiny))
 
 

@@ -51,6 +51,8 @@ def shots(camera: ImagedCamera, slices: list[Slice], coherence: Coherence) -> It
         arriving = []
         for amplitude, light, plane in zip(amplitudes, waves, planes, strict=True):
             with warnings.catch_warnings():
+                # The camera's parabolic lenses go with paraxial ways: its error says what both leave out.
+                warnings.filterwarnings("ignore", ".*beyond the Fresnel approximation", SamplingWarning)
                 if coherence.planes_independent:  # samples of random phase are points: no pitch is too coarse
                     warnings.simplefilter("ignore", SamplingWarning)
                 wave = Field(amplitude * light, plane.grid, camera.wavelength)

@@ -1,7 +1,7 @@
 """Arrays kept between runs: dear to compute, cheap to read.
 
-They lie in sealed files named by a hash of all that they depend on, under ``lumigraphCACHE``, or the user's
-cache folder; ``lumigraphCACHE=off`` keeps nothing. They are read as memory maps, which processes share.
+They lie in sealed files named by a hash of all that they depend on, under ``LUMIGRAPH_CACHE``, or the user's
+cache folder; ``LUMIGRAPH_CACHE=off`` keeps nothing. They are read as memory maps, which processes share.
 The ones that were not used for longest go when they hold more than `LIMIT`.
 """
 
@@ -23,7 +23,7 @@ _ENDING = ".kept.npz"
 
 def folder() -> Path | None:
     """Folder of the stored arrays; None if arrays are not stored, as for a user without a home."""
-    chosen = os.environ.get("lumigraphCACHE", "")
+    chosen = os.environ.get("LUMIGRAPH_CACHE", "")
     if chosen.lower() == "off":
         return None
     if chosen:

@@ -2,13 +2,19 @@
 
 What is new is written in a workplace, a hidden folder beside the target that its writer holds locked. The
 system gives the lock back when the writer ends, however it ends: an unlocked workplace is a dead writer's.
+
+Somebody else's folder may have such a name. A workplace is removed only where this user owns it, its name is
+one that a writer draws, it holds a mark with that name, and nothing but what a writer puts there. It is
+opened once, without following links, and what is in it is reached through that opening alone.
 """
 
 import ctypes
 import errno
 import os
+import re
 import secrets
 import shutil
+import stat
 import sys
 import time
 from collections.abc import Iterator
@@ -23,9 +29,10 @@ except ImportError:  # Windows: what a killed writer left stays
     fcntl = None
 
 PREFIX = ".lumigraph-"
-"""Names of workplaces begin with it."""
+"""Names of workplaces begin with it; 12 hexadecimal digits follow."""
 
-_NEW, _OLD = "new", "old"
+_NAME = re.compile(re.escape(PREFIX) + "[0-9a-f]{12}")
+_NEW, _OLD, _MARK = "new", "old", "workplace"
 _EXCHANGE = 2  # RENAME_EXCHANGE of Linux' renameat2, RENAME_SWAP of macOS' renamex_np
 _HERE = -100  # AT_FDCWD
 _SWEPT: set[Path] = set()
@@ -83,11 +90,14 @@ def replacing(path: str | os.PathLike[str], *, flush: bool = True) -> Iterator[P
 
 
 def sweep(folder: Path) -> None:
-    """Remove the workplaces of dead writers; what they had set aside and not yet replaced goes back."""
+    """Remove the workplaces of dead writers; what they had set aside and not yet replaced goes back.
+
+    Anything else is left alone, whatever its name.
+    """
     with suppress(OSError):
-        for place in [Path(entry.path) for entry in os.scandir(folder) if entry.name.startswith(PREFIX)]:
+        for name in [entry.name for entry in os.scandir(folder) if _NAME.fullmatch(entry.name)]:
             with suppress(OSError):
-                _clear(place)
+                _clear(folder / name)
 
 
 def sweep_once(folder: Path) -> None:
@@ -108,7 +118,9 @@ def restored(path: Path) -> bool:
 
 def _set_aside(path: Path) -> bool:
     try:
-        return any((place / _OLD / path.name).exists() for place in path.parent.glob(f"{PREFIX}*"))
+        names = [entry.name for entry in os.scandir(path.parent) if _NAME.fullmatch(entry.name)]
+        olds = [path.parent / name / _OLD for name in names]
+        return any(os.path.lexists(old / path.name) for old in olds if not old.parent.is_symlink())
     except OSError:  # a writer has ended meanwhile
         return True
 
@@ -155,21 +167,33 @@ def _locked_folder(folder: Path) -> tuple[Path, int | None]:
     for _ in range(3):  # another process may clear it before it is locked
         place = folder / f"{PREFIX}{secrets.token_hex(6)}"
         place.mkdir(mode=0o700)
-        lock = _lock(place)
+        lock = _lock(place, wait=True)
         if lock is not None or place.exists():
             break
+    try:
+        (place / _MARK).write_bytes(_mark(place.name))
+    except OSError:
+        shutil.rmtree(place, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+        raise
     return place, lock
 
 
-def _lock(place: Path) -> int | None:
+def _mark(name: str) -> bytes:
+    """What a workplace of this name says of itself: another folder with a copy of it is none."""
+    return f"workplace of a writer of lumigraph, {name}; removed when the writer has ended\n".encode()
+
+
+def _lock(place: Path, *, wait: bool = False) -> int | None:
     """A descriptor that holds a folder's lock; None where it is held, gone, or locks do not exist."""
     if fcntl is None:
         return None
     with suppress(OSError):
-        lock = os.open(place, os.O_RDONLY)
+        lock = os.open(place, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if os.path.samestat(os.fstat(lock), os.stat(place)):  # noqa: PTH116 - beside fstat
+            fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            if os.path.samestat(os.fstat(lock), os.lstat(place)):
                 return lock
         except OSError:
             pass
@@ -183,13 +207,82 @@ def _clear(place: Path) -> None:
     if lock is None:
         return
     try:
-        for old in place.glob(f"{_OLD}/*"):
-            target = place.parent / old.name
-            if not target.exists():
-                old.rename(target)
-        shutil.rmtree(place, ignore_errors=True)
+        if not _is_ours(lock, place.name):
+            return
+        _put_back(lock, place.parent)
+        for name in (_NEW, _OLD):
+            _remove(name, lock)
+        with suppress(FileNotFoundError):
+            os.unlink(_MARK, dir_fd=lock)  # last: a kill before it leaves what is still known as ours
+        place.rmdir()
     finally:
         os.close(lock)
+
+
+def _is_ours(folder: int, name: str) -> bool:
+    """Whether an open folder is a workplace of this user, to the last entry.
+
+    An empty one counts: its writer died before it left its mark, and only an empty folder is removed then.
+    """
+    about, inside = os.fstat(folder), set(os.listdir(folder))
+    if about.st_uid != os.geteuid() or stat.S_IMODE(about.st_mode) & 0o5077:
+        return False
+    if not inside:
+        return True
+    return inside <= {_NEW, _OLD, _MARK} and _marked(folder, name) and _is_aside(folder, inside)
+
+
+def _marked(folder: int, name: str) -> bool:
+    """Whether the mark of this name lies in an open folder, a file of this user with no second name."""
+    try:
+        mark = os.open(_MARK, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=folder)
+    except OSError:
+        return False
+    try:
+        about, expected = os.fstat(mark), _mark(name)
+        if not stat.S_ISREG(about.st_mode) or about.st_uid != os.geteuid() or about.st_nlink != 1:
+            return False
+        found = os.read(mark, len(expected) + 1)
+        # A writer that dies while it marks has put nothing else there yet.
+        return found == expected or (expected.startswith(found) and os.listdir(folder) == [_MARK])
+    finally:
+        os.close(mark)
+
+
+def _is_aside(folder: int, inside: set[str]) -> bool:
+    """Whether what is set aside is as a writer leaves it: one folder at most, in a folder, and no links."""
+    if _OLD not in inside:
+        return True
+    try:
+        old = os.open(_OLD, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=folder)
+    except OSError:
+        return False
+    try:
+        kinds = [entry.is_dir(follow_symlinks=False) for entry in os.scandir(old)]
+        return len(kinds) <= 1 and all(kinds)
+    finally:
+        os.close(old)
+
+
+def _put_back(folder: int, parent: Path) -> None:
+    """Move what a dead writer had set aside to where it was, unless the new one has taken its place."""
+    with suppress(FileNotFoundError):
+        old = os.open(_OLD, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=folder)
+        try:
+            for name in os.listdir(old):  # noqa: PTH208 - of an open folder
+                if not os.path.lexists(parent / name):
+                    os.rename(name, parent / name, src_dir_fd=old)
+        finally:
+            os.close(old)
+
+
+def _remove(name: str, folder: int) -> None:
+    """Remove a file or a folder from an open folder, without following links."""
+    with suppress(FileNotFoundError):
+        if stat.S_ISDIR(os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode):
+            shutil.rmtree(name, dir_fd=folder)
+        else:
+            os.unlink(name, dir_fd=folder)
 
 
 def _take_over(target: Path, temporary: Path) -> None:
@@ -210,6 +303,7 @@ def _take_place(temporary: Path, target: Path) -> None:
     elif not _exchanged(temporary, target):  # two steps, and the old folder is kept until the second
         old = temporary.with_name(_OLD) / target.name
         old.parent.mkdir()
+        _flush_entry(temporary.with_name(_MARK))  # after a cut of the power, too, the old folder goes back
         target.rename(old)
         temporary.rename(target)
 

@@ -6,3 +6,9 @@
 - `adaptive`: aberrations estimated from the light field itself
 - `thesis`: the tables and figures of the thesis, reproduced
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__, submodules={"adaptive", "information", "optimisation", "thesis", "tolerance"}
+)

@@ -1,14 +1,20 @@
 """The viewer: a page in the browser, served on the loopback interface or written as one file.
 
-- `server`, `address`, `safety`, `connections`: a table of resources behind a random token, safely served
-- `exhibit`, `opening`, `start`: the contents of a page, from files or raw images; its first picture
-- `parts`, `encoding`, `packing`: an exhibit as a description (JSON) and arrays, as bytes or pictures
-- `page`, `single_file`, `inline`, `static/`: the page as a table, as one file, in a notebook; its sources
-- `pyramid`, `folder`: the page as a folder for any web server, with pictures in several steps, in tiles
+- `server`: what is served: a fixed table of resources behind a random token; knows nothing of light fields
+- `address`: a private file that leads a browser to the page
+- `safety`: which requests are answered, and the headers of every answer
+- `exhibit`: what one page shows: views, raw image, focal stack, depth, volume
+- `opening`: a file, or a raw image with its calibration, as an exhibit
+- `parts`: an exhibit as a description (JSON) and arrays that are sent when they are asked for
+- `encoding`: arrays as bytes: as they are, losslessly smaller, or as pictures
+- `page`: the page's files, as a table to serve
+- `packing`: how arrays are kept in a page that is written
+- `single_file`: the same page as one file that works from disk
+- `pyramid`, `folder`: the same page as a folder for any web server, with pictures in several steps, in tiles
 - `designer`, `designer_parameters`, `designer_curves`, `designer_point`: a camera as sliders
 """
 
-from lumigraph.viewer.address import Address, address_of
+from lumigraph.viewer.address import redirecting
 from lumigraph.viewer.designer import designer_site
 from lumigraph.viewer.exhibit import Exhibit
 from lumigraph.viewer.folder import check_folder, export_folder, serve_folder
@@ -19,17 +25,16 @@ from lumigraph.viewer.server import Resource, Site, serve
 from lumigraph.viewer.single_file import export
 
 __all__ = [
-    "Address",
     "Exhibit",
     "Origin",
     "Resource",
     "Site",
-    "address_of",
     "check_folder",
     "designer_site",
     "export",
     "export_folder",
     "open_exhibit",
+    "redirecting",
     "serve",
     "serve_folder",
     "site",

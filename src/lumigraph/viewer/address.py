@@ -1,68 +1,61 @@
-"""The same address for the same file, so that links copied from a page open it again the next time."""
+"""A file that leads a browser to a page, so that the page's address stands in no command line.
 
-import base64
-import hmac
+Every local user can read the arguments of every process. The file's name says nothing, and only its owner
+can read it.
+"""
+
+import atexit
+import html
 import os
-import secrets
-from collections.abc import Sequence
+import tempfile
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from lumigraph import store
 
-_SECRET = 32  # bytes
-_FIRST_PORT, _PORTS = 49152, 16384  # those that no service is registered for
+_PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="referrer" content="no-referrer">
+<meta http-equiv="refresh" content="0; url={address}">
+<title>lumigraph</title>
+</head>
+<body><p><a href="{address}">Open the page</a></p></body>
+</html>
+"""
 
 
-@dataclass(frozen=True, slots=True)
-class Address:
-    """Address of a page: token and port.
-
-    Parameters
-    ----------
-    token
-        First part of every path, which only the holder of the secret can derive.
-    port
-        Tried first; any free one where it is taken.
-    """
-
-    token: str
-    port: int
-
-
-def address_of(paths: Sequence[Path], folder: Path | None = None) -> Address | None:
-    """The address of these files on this computer for this user; None where no secret can be kept.
+def redirecting(address: str, folder: Path | None = None) -> Path:
+    """A new file of this user alone that opens a page; it is removed when the program ends.
 
     Parameters
     ----------
-    paths
-        What the page shows.
+    address
+        Of the page, with its token.
     folder
-        Where the secret lies; the user's cache folder if left out.
+        Where it lies; the user's cache folder if left out, or a new one of the system's for temporary files.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
     """
-    secret = _secret(folder or store.folder())
-    if secret is None:
-        return None
-    names = b"\0".join(os.fsencode(path.absolute()) for path in paths)
-    digest = hmac.digest(secret, names, "sha256")
-    token = base64.urlsafe_b64encode(digest[:24]).decode()
-    return Address(token, _FIRST_PORT + int.from_bytes(digest[24:28], "big") % _PORTS)
+    place = folder or store.folder()
+    try:
+        if place is None:
+            raise OSError
+        place.mkdir(parents=True, exist_ok=True)
+        descriptor, name = tempfile.mkstemp(".html", "open-", place)  # mode 0600, and never an old file
+    except OSError:
+        descriptor, name = tempfile.mkstemp(".html", "lumigraph-open-")
+    with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+        file.write(_PAGE.format(address=html.escape(address)))
+    path = Path(name).absolute()
+    atexit.register(_remove, path)
+    return path
 
 
-def _secret(folder: Path | None) -> bytes | None:
-    """Random bytes of the user, created on first use; None where others could read them."""
-    if folder is None:
-        return None
-    path = folder / "viewer.key"
+def _remove(path: Path) -> None:
     with suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-        with suppress(FileExistsError):
-            made = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            with os.fdopen(made, "wb") as file:
-                file.write(secrets.token_bytes(_SECRET))
-        about = path.lstat()
-        private = os.name == "nt" or (about.st_uid == os.getuid() and not about.st_mode & 0o077)
-        found = path.read_bytes() if private and path.is_file() and not path.is_symlink() else b""
-        return found if len(found) == _SECRET else None
-    return None
+        path.unlink()

@@ -15,7 +15,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress, part, silent
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
-from lumigraph.io.target import check_target
+from lumigraph.io.target import check_target, is_clutter
 from lumigraph.viewer import safety
 from lumigraph.viewer.encoding import Coded, white_level
 from lumigraph.viewer.exhibit import Exhibit, comfortable, depth_of, grey_or_colour
@@ -59,7 +59,7 @@ def check_folder(path: Path) -> Path:
         return check_target(path)
     check_target(path / "index.html")
     for entry in path.iterdir():
-        if entry.name not in _ENTRIES and not entry.name.startswith("."):
+        if entry.name not in _ENTRIES and not is_clutter(entry):
             raise FormatError(
                 f"writing {path} would remove {entry.name}, which it holds too. Choose another folder."
             )

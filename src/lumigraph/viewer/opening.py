@@ -19,6 +19,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.core.raw import RawImage
+from lumigraph.core.saturation import with_bits
 from lumigraph.core.short_repr import called
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
@@ -90,11 +91,17 @@ class Origin(Given):
         Of a camera 2.0 [px]: pictures with patches about this size.
     page
         Of a stack of raw images, counted from 0.
+    bit_depth
+        Of a raw image whose file does not say.
+    mosaic
+        Views (v, u) of a picture of blocks, one for each lenslet.
     """
 
     camera: Described | None = None
     patch: float | None = None
     page: int | None = None
+    bit_depth: int | None = None
+    mosaic: tuple[int, int] | None = None
 
     @property
     def is_known(self) -> bool:
@@ -125,8 +132,11 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
     if is_camera(path):
         return _simulated(path, tell)
     tell(Stage(0.0, "reading"))
-    one = origin.page if origin is not None and io.opens_pages(path) else None
-    found = io.open(path, page=one)
+    mosaic = origin.mosaic if origin is not None else None
+    one = origin.page if origin is not None and mosaic is None and io.opens_pages(path) else None
+    found = io.open(path, page=one, views=mosaic)
+    if mosaic is not None and origin is not None:
+        origin = replace(origin, mosaic=None)
     if origin is not None and one is not None and not isinstance(found, RawImage):
         origin = replace(origin, page=None)
     if origin is not None and (
@@ -136,6 +146,7 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
     if isinstance(found, DepthMap):
         found = RawImage(found.values)
     if isinstance(found, RawImage):
+        found = with_bits(found, None if origin is None else origin.bit_depth)
         return _raw(path.name, found, origin or Origin(), tell)
     if origin not in (None, Origin()):
         raise FormatError(
@@ -144,6 +155,9 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
         )
     match found:
         case LightField():
+            from lumigraph.rendering import check_arrangement
+
+            check_arrangement(found, path.name)
             return of_views(path.name, found)
         case Stack():
             return of_stack(path.name, found)

@@ -17,7 +17,6 @@ from typing import Any
 
 from lumigraph.errors import LumigraphError
 from lumigraph.viewer import safety
-from lumigraph.viewer.address import Address
 
 LOOPBACK = "127.0.0.1"
 
@@ -153,11 +152,8 @@ def _response(content: Any, status: int = 200, media: str = "text/plain; charset
     return Response(content, status, safety.HEADERS, media)
 
 
-def serve(
-    site: Site, *, port: int = 0, host: str = LOOPBACK, ready: Callable[[str], None] = print,
-    address: Address | None = None,
-) -> None:  # fmt: skip
-    """Answer requests until Ctrl-C.
+def serve(site: Site, *, port: int = 0, host: str = LOOPBACK, ready: Callable[[str], None] = print) -> None:
+    """Answer requests until Ctrl-C, under a new token.
 
     Parameters
     ----------
@@ -169,16 +165,14 @@ def serve(
         Address to listen on. Beyond the loopback interface whoever has the address with its token can look.
     ready
         Called with the address, token included, when requests are answered.
-    address
-        Token, and the port that is tried first where `port` is 0; both random if left out.
 
     Raises
     ------
     LumigraphError
         The port is taken or not allowed.
     """
-    listener = _listener(host, port) if port or address is None else _usual(host, address.port)
-    port, token = listener.getsockname()[1], address.token if address else secrets.token_urlsafe(24)
+    listener = _listener(host, port)
+    port, token = listener.getsockname()[1], secrets.token_urlsafe(24)
     with listener, suppress(KeyboardInterrupt):
         server = _server(application(site, token, safety.hosts(port) if host == LOOPBACK else frozenset()))
         ready(f"http://{host}:{port}/{token}/")
@@ -197,14 +191,6 @@ def _server(app: Any) -> Any:
             timeout_graceful_shutdown=1, h11_max_incomplete_event_size=16384,
         )
     )  # fmt: skip
-
-
-def _usual(host: str, port: int) -> socket.socket:
-    """A listener on this port, or on any where it is taken, as by the same page in another window."""
-    try:
-        return _listener(host, port)
-    except LumigraphError:
-        return _listener(host, 0)
 
 
 def _listener(host: str, port: int) -> socket.socket:

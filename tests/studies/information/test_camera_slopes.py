@@ -91,7 +91,7 @@ def ends(given, key, step):
         (FREE, ("built.lenslet_distance",), "lateral"),
         (HEX, ("lenslets.pitch", "lenslets.focal_length.1"), "lateral"),
         (ONE, ("lenslets.pitch", "object_distance"), "brightness"),
-        (DIFFER, ("built.form_scatter",), "depth"),
+        pytest.param(DIFFER, ("built.form_scatter",), "depth", marks=pytest.mark.long),
         pytest.param(
             OWN,
             ("lenslets.single.25.focal_change", "lenslets.single.24.offset_x"),

@@ -11,7 +11,7 @@ from lumigraph.units import mm
 
 def test_light_through_a_lens_of_glass_is_that_of_its_entrance_pupil(monkeypatch, tmp_path):
     """Its pupils differ by 1.25: by places before the exit pupil's thin lens light would change by 2.5 %."""
-    monkeypatch.setenv("lumigraphCACHE", "off")
+    monkeypatch.setenv("LUMIGRAPH_CACHE", "off")
     monkeypatch.setattr(glass, "Prescription", Lens)
     glass._glass.cache_clear()
     glass._first_order.cache_clear()

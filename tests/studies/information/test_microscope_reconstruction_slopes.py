@@ -76,7 +76,7 @@ def test_slopes_are_central_differences_of_the_same_estimate(of, scenes, key, va
     assert step / 1e-6 * slope == pytest.approx(high - low, rel=2e-3, abs=0)
 
 
-@pytest.mark.parametrize("of", [in_image, in_pupil])
+@pytest.mark.parametrize("of", [pytest.param(in_image, marks=pytest.mark.long), in_pupil])
 def test_slopes_are_told_with_the_error(of):
     scenes, pair = Scenes((1.8 if of is in_image else 14) * UM, 8), (of(aperture=0.2), of(aperture=0.21))
     found = reconstruction_slopes(of(aperture=0.205), [pair], DEPTHS, scenes, LIGHT, volume=True)

@@ -77,7 +77,7 @@ def test_derivatives_are_those_of_the_images(points):
         assert np.linalg.norm(slope - lit[1 + axis]) < 0.01 * np.linalg.norm(slope)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", ["square", pytest.param("round", marks=pytest.mark.long)])
 def test_points_by_the_pupil_and_by_the_image_are_the_same(shape):
     """Those of rays are known by their images alone, and differentiated by differences."""
     one, other = source(scope(shape), np.array([-9 * UM]), 1e-2), MicroscopeSource(scope(shape), 1e-2)
@@ -146,3 +146,16 @@ def test_exact_cameras_keep_differences():
     assert isinstance(points, CameraSource)
     _, errors = points.lit(np.array([0.1e-3, 0.1e-3, 0.0]), checked=True)
     assert (errors > 0).all()
+
+
+@pytest.mark.parametrize("lenslets", [{}, {"layout": "hex"}, HEX], ids=["squares", "hexagons", "three kinds"])
+def test_a_cell_holds_a_lenslet_of_each_kind_as_the_main_lens_shows_it(lenslets):
+    camera = lg.load_camera("thesis-plenoptic-2-m050").replace(lenslets=lenslets)
+    lattice, dz = camera.lattice, 4e-3
+    shown = (camera.object_distance + dz) / camera.separation
+    cell = source(camera, np.array([dz]), 1e-2).cell(dz) / shown
+    around = np.indices((9, 9)).reshape(2, -1).T - 4
+    parts = (lattice.position(around) - lattice.origin) @ np.linalg.inv(cell) + 1e-9
+    inside = around[((parts >= 0) & (parts < 1)).all(1)]
+    assert sorted(lattice.kind(*inside.T)) == list(range(lattice.kinds))
+    assert abs(np.linalg.det(cell)) == pytest.approx(lattice.kinds * lattice.cell_area, rel=1e-9)

@@ -44,7 +44,10 @@ def test_a_number_with_a_known_optimum_is_found(search):
 
 def test_the_largest_is_the_other_end():
     vary = {"lenslets.magnification": "0.3:0.6:3"}
-    found = lg.optimise(CAMERA, vary, "largest cross-talk", evaluations=20)
+    seen = []
+    found = lg.optimise(CAMERA, vary, "largest cross-talk", evaluations=20, progress=seen.append)
+    assert seen == sorted(seen)
+    assert 0 < seen[0] < 0.1 < seen[-1] <= 1
     assert found.active == {"lenslets.magnification": 0.6}
     assert 0 < found.gain(found.start) < 0.1
 
@@ -135,6 +138,7 @@ def test_bounds_fall_and_the_best_is_a_camera_that_has_them():
     assert again.depth == pytest.approx(found.best["depth"], rel=1e-6)
 
 
+@pytest.mark.long  # 18 s
 def test_the_best_bound_carries_the_error_of_its_derivatives():
     """A step that is far too long shows: what is said holds the bound by the right one."""
     camera = lg.load_camera(CAMERA).replace(main_lens={"diameter": "3 mm"}, model="exact")
@@ -351,6 +355,7 @@ def test_the_verb_writes_a_camera_and_says_before_and_after(tmp_path, capsys):
     assert capsys.readouterr().err.startswith("lumigraph: error: ")
 
 
+@pytest.mark.long  # 9 s
 def test_gradients_move_single_lenslets_where_a_simplex_stalls():
     """Twelve keys, 14 cameras: the bound falls as slopes say, at the two depths and not between them."""
     start = lg.load_camera(SCOPE).replace(

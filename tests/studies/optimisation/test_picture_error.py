@@ -72,6 +72,7 @@ def test_nonsense_is_refused_before_any_camera():
 
 
 @pytest.mark.filterwarnings("ignore:half-way between the depths")
+@pytest.mark.long  # 13 s
 def test_gradients_lead_to_a_better_camera_without_lenslets():
     vary = {"main_lens.diameter": "1 mm:8 mm:1", "main_lens.aberrations.4": "-0.5:0.5:1"}
     found = lg.optimise(plain(), vary, goal(), search="gradient", evaluations=8)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lumigraph.rendering import decode
-from lumigraph.studies.thesis import Context, experiments, find
-from lumigraph.studies.thesis.figures import figure_4_12, table_4_1, table_4_2
+from lumigraph.studies.thesis import Context, ResultRow, experiments, find
+from lumigraph.studies.thesis.figures import figure_4_8, figure_4_12, table_4_1, table_4_2
 from lumigraph.units import mm
 
 IDS = [one.id for one in experiments() if one.id.split("-")[-1].split(".")[0] in ("1", "4")]
@@ -21,7 +21,7 @@ SLOW = ("table-4.2", "figure-1.20", "figure-4.8", "figure-4.12")  # 10 s and mor
 
 @pytest.mark.parametrize("name", [name for name in IDS if name not in SLOW])
 def test_all_rows_pass_at_reduced_size(name, monkeypatch):
-    monkeypatch.delenv("lumigraphDATA", raising=False)
+    monkeypatch.delenv("LUMIGRAPH_DATA", raising=False)
     (one,) = find([name])
     outcome = one.run(Context(quick=True))
     assert outcome.figures
@@ -29,6 +29,32 @@ def test_all_rows_pass_at_reduced_size(name, monkeypatch):
     checked = [row for row in outcome.rows if row.passed is not None]
     assert len(checked) >= 2
     assert [(row.quantity, row.got, row.expected) for row in checked if not row.passed] == []
+
+
+def test_real_letters_are_a_row_and_a_figure_where_there_are_some(monkeypatch, tmp_path):
+    (one,) = find(["figure-4.8"])
+    drawn = [ResultRow("simulated", 1.0)]
+    for name, stub in (("_aperture_rows", drawn), ("_view_rows", drawn), ("_scene_views", None)):
+        monkeypatch.setattr(figure_4_8, name, lambda *_, stub=stub: stub)
+    monkeypatch.setattr(figure_4_8, "_figure", lambda views, what: (views, what))
+    monkeypatch.setattr(table_4_1, "point", lambda camera, dz: np.zeros(camera.sensor.shape))
+    asked = []
+    monkeypatch.setattr(figure_4_8, "_real_views", lambda folder: asked.append(folder) or (None, 297.4e-6))
+    monkeypatch.delenv("LUMIGRAPH_DATA", raising=False)
+    without = one.run(Context(quick=True))
+    monkeypatch.setenv("LUMIGRAPH_DATA", str(tmp_path))
+    folder = tmp_path / "letters_plenoptic1"
+    folder.mkdir()
+    (folder / "letters_ULF_M1.png").touch()
+    half = one.run(Context(quick=True))
+    assert not asked  # its white image is missing
+    (folder / "letters_ULF_M1_white.png").touch()
+    there = one.run(Context(quick=True))
+    assert asked == [folder]
+    assert [len(found.rows) for found in (without, half, there)] == [2, 2, 3]
+    assert [len(found.figures) for found in (without, half, there)] == [1, 1, 2]
+    assert (there.rows[-1].quantity, there.rows[-1].passed) == ("real camera, lenslet pitch", True)
+    assert there.rows[-1].got == pytest.approx(297.4)
 
 
 def test_energies_share_out_all_light():

@@ -30,8 +30,8 @@ IDS = (
 )
 
 
-# 10 s and more: run at full size alone
-SLOW = ("figure-5.3", "table-5.3", "table-5.4", "figure-5.17", "figure-6.5")
+# 5 s and more: run at full size alone
+SLOW = ("figure-5.3", "table-5.3", "table-5.4", "figure-5.17", "figure-6.5", "figure-6.6")
 
 
 @pytest.mark.parametrize("name", [name for name in IDS if name not in SLOW])

@@ -245,3 +245,16 @@ def test_experiments_run_without_the_extras(monkeypatch):
 
     monkeypatch.setattr(run, "version", version)
     assert run._files.__wrapped__()[-1] == ("", b"numpy  scipy  scikit-image ")
+
+
+def test_the_bar_of_some_experiments_goes_from_one_to_the_next_and_never_back(tmp_path):
+    def halves(context):
+        context.progress(0.5, "half")
+        context.progress(1.0)
+        return ExperimentOutcome((ResultRow("x", 1.0),))
+
+    seen = []
+    chosen = [made(halves, f"table-9.{number}") for number in (1, 2, 3)]
+    run.run(chosen, tmp_path, progress=seen.append)
+    assert [float(told) for told in seen] == pytest.approx(np.array([0, 1, 2, 2, 3, 4, 4, 5, 6]) / 6)
+    assert seen[4].what == "table-9.2: half"

@@ -22,7 +22,7 @@ from lumigraph.metrology.boards.camera import MetricCamera
 
 _MM = 1e-3
 _SIN60 = math.sqrt(3) / 2
-_GEOMETRIES = {"square": 0, "hex": 1}
+_GEOMETRIES = {"square": 0, "rectangular": 0, "hex": 1}
 _SEEN = 0.01  # px by which micro-images may be irregular without a note
 _WIDEST = 0.05  # px by which a lattice may be sheared at its end without a note
 

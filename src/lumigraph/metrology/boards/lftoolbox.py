@@ -82,12 +82,13 @@ def info_of(
     Raises
     ------
     FormatError
-        A hexagonal array, or fewer than two views.
+        A hexagonal or rectangular array, or fewer than two views.
     """
     lattice = calibration.lattice
     if lattice.layout != "square":
         raise FormatError(
-            "the lattice is hexagonal but LFToolbox' matrix counts on a square one. Give a square array."
+            f"the lattice is {lattice.layout} but LFToolbox' matrix counts on a square one. "
+            "Give a square array."
         )
     if views < 2:
         raise FormatError(f"views is {views} but must be at least 2.")

@@ -333,7 +333,7 @@ class _Before:
         sides = np.diff(_centers(self.camera, points, np.zeros(2)).reshape(-1, 5, 2), axis=1)
         edges = np.arctan2(*np.moveaxis(sides, -1, 0))
         lattice = self.calibration.lattice
-        apart = math.pi / (2 if lattice.layout == "square" else 3)
+        apart = math.pi / (3 if lattice.layout == "hex" else 2)
         away = np.abs((edges - lattice.rotation + apart / 2) % apart - apart / 2).min(1)
         return float(_ROLLS[np.argmax(np.minimum(away, _ASLANT).round(6))])
 

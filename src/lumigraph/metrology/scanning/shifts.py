@@ -22,9 +22,9 @@ from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
 from lumigraph.instruments.capabilities import Decoded
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.lenslet_camera import LensletCamera
-from lumigraph.instruments.lenslet_light import Lensed, LensletPixels
 from lumigraph.instruments.microscope import LightFieldMicroscope
 from lumigraph.metrology.scanning.joint import pairs_of
+from lumigraph.metrology.scanning.lenslet_light import Lensed, LensletPixels
 from lumigraph.metrology.scanning.texture import PartEvidence, PicturePart
 
 REACH = 0.5

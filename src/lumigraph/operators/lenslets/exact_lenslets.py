@@ -13,6 +13,13 @@ The main lens' light comes with the sphere around the middle of its stop, :math:
 Lenslets of glass take the path of their `GlassSurface` away instead, and have its amplitude and width. None of the
 three is a product of a function of y and one of x, as their paraxial forms are, but each is a sum
 of few: singular values of what is left of them beside their own axes' phases.
+
+A curved side that faces the sensor is followed where it stands (`CurvedGlassLenslets`), s before its vertex:
+
+.. math:: R^2 = (b + s)^2 + |S - v|^2, \quad t = e^{-i k n s}, \quad \frac{1}{2} (\cos\theta_t + n \cdot r)
+
+with Kirchhoff's mean of the normal's cosines with the ray along the axis and with the way. What the sagitta
+along one axis does to ways along the other is one more sum of products for each.
 """
 
 import math
@@ -26,18 +33,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from lumigraph.elements import GlassSurface, LensletArray
-from lumigraph.operators.lenslets.cell_response import (
-    MIDDLE,
-    Accepted,
-    Box,
-    CellAxis,
-    CellLenslets,
-    Pair,
-    bent,
-    focal_lengths,
-    sphere,
-)
+from lumigraph.operators.lenslets.cell_response import CellLenslets, bent, focal_lengths, sphere
 from lumigraph.operators.sampling import cells as _cells
+from lumigraph.operators.sampling.cell_axis import MIDDLE, Accepted, Box, CellAxis, Pair
 from lumigraph.operators.sampling.optics import Optics
 
 KEPT = 0.2
@@ -178,8 +176,12 @@ class ExactLenslets(CellLenslets):
         self.least = KEPT * accuracy
         (self.focal_length,) = focal_lengths(array)
         self.surface, self.width = surface, array.fill_factor * array.lattice.pitch / 2
-        self._half = self.width if surface is None else surface.seen(self.width, self.focal_length)
+        self._half = self.width if surface is None else self._seen(surface)
         self._terms: dict[Box, tuple[tuple[Products, ...], list[tuple[int, ...]]]] = {}
+
+    def _seen(self, surface: GlassSurface) -> float:
+        """Half the width of what is seen of glass [m]."""
+        return surface.seen(self.width, self.focal_length)
 
     def _bent(self, squared: np.ndarray) -> np.ndarray:
         if self.surface is None:
@@ -197,7 +199,7 @@ class ExactLenslets(CellLenslets):
         Kept are those whose strengths' product counts.
         """
         if box not in self._terms:
-            parts = self._parts(box, (None, None, None))
+            parts = self._parts(box, (None,) * self.sums)
             numbers = product(*(range(len(part.strength)) for part in parts))
             strengths = {n: math.prod(p.strength[k] for p, k in zip(parts, n, strict=True)) for n in numbers}
             self._terms[box] = parts, [n for n, strength in strengths.items() if strength > self.least]
@@ -209,7 +211,10 @@ class ExactLenslets(CellLenslets):
             parts, numbers = like.terms(theirs)
             self._terms[box] = self._parts(box, parts), numbers
 
-    def _parts(self, box: Box, like: Sequence[Products | None]) -> tuple[Products, Products, Products]:
+    sums = 3
+    """Of products, whose product light is beside the axes' own phases."""
+
+    def _parts(self, box: Box, like: Sequence[Products | None]) -> tuple[Products, ...]:
         return self._way(box, like[0]), self._lenslet(like[1]), self._sphere_around(box, like[2])
 
     def _reach(self, box: Box) -> Pair:
@@ -220,25 +225,35 @@ class ExactLenslets(CellLenslets):
         return y, x
 
     def _way(self, box: Box, like: Products | None) -> Products:
-        tilt, b, k = self.scale - 1, self.b, self.k
-        middle = box[0][0] * tilt, box[0][1] * tilt
-        half = self._reach((box[0], (box[1][0] * tilt, box[1][1] * tilt)))
+        b, k, (middle, half) = self.b, self.k, self._ways(box)
 
         def beside(y: np.ndarray, x: np.ndarray) -> np.ndarray:
             squared = b * b + y * y + x * x
             path = _left(lambda squared: sphere(squared, b), y, x)
-            return b * b / squared * (1 + 1j / (k * np.sqrt(squared))) * np.exp(1j * k * path)
+            return self._oblique(squared) * (1 + 1j / (k * np.sqrt(squared))) * np.exp(1j * k * path)
 
         def bright(*places: np.ndarray) -> tuple[np.ndarray, ...]:
-            """Edges send light aside that falls with the distance, from a lenslet's own micro-image on."""
-            result, falls = [], np.pi * self.array.lattice.pitch / math.sqrt(math.prod(self.optics))
-            for at, m, spread in zip(places, middle, box[1], strict=True):
-                beyond = np.abs(at - m) - spread * tilt - self.array.lattice.pitch
-                result.append(1 / (1 + falls * np.maximum(0, beyond) / self.array.lattice.pitch))
-            return tuple(result)
+            return tuple(self._falling(which, at, box) for which, at in enumerate(places))
 
         far = max(abs(m) + h for m, h in zip(middle, half, strict=True))
         return products(beside, middle, half, Terms(self._turns(far, b), self.least, like), bright)
+
+    def _ways(self, box: Box) -> tuple[Pair, Pair]:
+        """Middle and half of the ways across from lenslets to the sensor, for cells in a box [m]."""
+        tilt = self.scale - 1
+        middle = box[0][0] * tilt, box[0][1] * tilt
+        return middle, self._reach((box[0], (box[1][0] * tilt, box[1][1] * tilt)))
+
+    def _oblique(self, squared: np.ndarray) -> np.ndarray:
+        """Amplitude by the squared way, 1 along the axis."""
+        return self.b * self.b / squared
+
+    def _falling(self, which: int, at: np.ndarray, box: Box) -> np.ndarray:
+        """Edges send light aside that falls with the distance, from a lenslet's own micro-image on."""
+        pitch, tilt = self.array.lattice.pitch, self.scale - 1
+        falls = np.pi * pitch / math.sqrt(math.prod(self.optics))
+        beyond = np.abs(at - box[0][which] * tilt) - box[1][which] * tilt - pitch
+        return 1 / (1 + falls * np.maximum(0, beyond) / pitch)
 
     def _lenslet(self, like: Products | None) -> Products:
         def beside(y: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -275,15 +290,107 @@ class ExactLenslets(CellLenslets):
         """As `CellLenslets.kernel`: (terms, ...), whose products are added up."""
         (image, at, off), (parts, terms) = places, self.terms(box)
         apart, there = self.scale * image - at + (self.scale - 1) * place, at + place
-        path = sphere(apart**2, self.b) + sphere(there**2, self.L) - self._bent(off**2)
-        way, lenslet, curved = (
-            part.along(which, one) for part, one in zip(parts, (apart, off, there), strict=True)
+        way, lenslet, curved, *mixed = (
+            part.along(which, one)
+            for part, one in zip(parts, self._places(which, (apart, off, there)), strict=True)
         )
-        beside = np.stack([way[n] * (lenslet[i] * curved[j]) for n, i, j in terms])
+        beside = np.stack([
+            math.prod((part[m] for part, m in zip(mixed, more, strict=True)), start=way[n])
+            * (lenslet[i] * curved[j])
+            for n, i, j, *more in terms
+        ])  # fmt: skip
+        path, beside = self._along_axis(apart, off, beside)
+        path = path + sphere(there**2, self.L)
         if self.pixels is not None:
             chief = np.arctan((image + place) / self.L)
             beside *= np.sqrt(self.pixels[0].of(np.arctan(apart / self.b) - chief))
         return self.k * path, beside / math.sqrt(math.prod(self.optics))
+
+    def _places(self, which: int, places: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+        """What each sum of products depends on, of ways, places in lenslets and places from the axis."""
+        return places
+
+    def _along_axis(
+        self, apart: np.ndarray, off: np.ndarray, beside: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Path along one axis [m], and all terms with what this axis alone does to amplitudes."""
+        return sphere(apart**2, self.b) - self._bent(off**2), beside
+
+
+class CurvedGlassLenslets(ExactLenslets):
+    """Lenslets of glass whose curved side faces the sensor, followed from that side; see `ExactLenslets`."""
+
+    surface: GlassSurface
+    sums = 5
+
+    def _seen(self, surface: GlassSurface) -> float:
+        return self.width
+
+    def _bent(self, squared: np.ndarray) -> np.ndarray:
+        return (self.surface.index - 1) * self._curved(squared)[0]
+
+    def _bright(self, squared: np.ndarray) -> Any:
+        """Of light along the axis that goes on along it: no power is lost where it is refracted."""
+        sag, cosine, _ = self._curved(squared)
+        turned = self._turned(cosine)
+        return np.sqrt(cosine / turned) / cosine * (turned + cosine) / 2 * self.b / (self.b + sag)
+
+    def _oblique(self, squared: np.ndarray) -> np.ndarray:
+        ratio = self.b / np.sqrt(squared)
+        return ratio * (1 + ratio) / 2
+
+    def _curved(self, squared: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.surface.curved(squared, self.focal_length)
+
+    def _turned(self, cosine: np.ndarray) -> np.ndarray:
+        """Cosine of the refracted ray with the normal, by that of the ray in glass."""
+        return np.sqrt(1 - self.surface.index**2 * (1 - cosine**2))
+
+    def _parts(self, box: Box, like: Sequence[Products | None]) -> tuple[Products, ...]:
+        return (*super()._parts(box, like[:3]), self._mixed(box, 0, like[3]), self._mixed(box, 1, like[4]))
+
+    def _mixed(self, box: Box, which: int, like: Products | None) -> Products:
+        """What the sagitta along one axis does to ways along the other."""
+        (middle, half), other = self._ways(box), 1 - which
+
+        def beside(*places: np.ndarray) -> np.ndarray:
+            return np.exp(1j * self.k * self._longer(places[which], places[other]))
+
+        def bright(*places: np.ndarray) -> tuple[np.ndarray, ...]:
+            fall, even = self._falling(other, places[other], box), np.ones(len(places[which]))
+            return (even, fall) if which == 0 else (fall, even)
+
+        far = np.asarray(abs(middle[other]) + half[other])
+        turns = abs(float(self._longer(np.asarray(self.width), far))) * self.k / (2 * np.pi)
+        there = [0.0, 0.0], [self.width, self.width]
+        there[0][other], there[1][other] = middle[other], half[other]
+        return products(
+            beside,
+            (there[0][0], there[0][1]),
+            (there[1][0], there[1][1]),
+            Terms(turns, self.least, like),
+            bright,
+        )
+
+    def _longer(self, off: np.ndarray, apart: np.ndarray) -> np.ndarray:
+        """How much longer a way across is from a place in front of the vertex' plane, than both alone [m]."""
+        squared, ahead = apart**2, self.b + self._curved(off**2)[0]
+        return squared / (np.sqrt(ahead**2 + squared) + ahead) - sphere(squared, self.b)
+
+    def _places(self, which: int, places: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+        apart, off, there = places
+        return (apart, off, there, off, apart) if which == 0 else (apart, off, there, apart, off)
+
+    def _along_axis(
+        self, apart: np.ndarray, off: np.ndarray, beside: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        sag, cosine, across = self._curved(off**2)
+        turned, ahead = self._turned(cosine), self.b + sag
+        way, straight = np.sqrt(ahead**2 + apart**2), np.sqrt(self.b**2 + apart**2)
+        leaning = turned + (cosine * ahead + across * off * apart) / way
+        alone = (turned + cosine) * (1 + self.b / straight) / 2
+        beside = beside * (leaning / alone * (ahead * straight) / (self.b * way))
+        return sphere(apart**2, self.b) + self._longer(off, apart) - self._bent(off**2), beside
 
 
 def _left(path: Callable[[np.ndarray], np.ndarray], y: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -298,7 +405,8 @@ def lenslets_of(optics: Optics) -> CellLenslets:
         telecentric = _cells.telecentric_distance(camera)
         return CellLenslets(axes, array, camera.wavelength, telecentric, _cells.accepted(camera))
     distance, accuracy = _cells.lenslet_distance(camera), optics.fineness.accuracy
-    return ExactLenslets(
+    glass = camera.surface
+    return (ExactLenslets if glass is None or glass.thickness is not None else CurvedGlassLenslets)(
         axes, array, camera.wavelength, distance, camera.separation, accuracy, _cells.accepted(camera),
         camera.surface,
     )  # fmt: skip

@@ -20,19 +20,13 @@ import numpy as np
 
 from lumigraph.elements import LensletArray, Scatter, form
 from lumigraph.errors import GeometryError
-from lumigraph.operators.lenslets.cell_response import (
-    STEP,
-    CellAxis,
-    CellLenslets,
-    focal_lengths,
-    legendre,
-    nodes,
-)
+from lumigraph.operators.lenslets.cell_response import CellLenslets, focal_lengths, legendre, nodes
 from lumigraph.operators.lenslets.lenslet_light import AROUND
 from lumigraph.operators.lenslets.line_parts import Key, Pieces
 from lumigraph.operators.lenslets.lines import bright_ones
 from lumigraph.operators.sampling import cells as _cells
 from lumigraph.operators.sampling.camera import CameraOptics, Model
+from lumigraph.operators.sampling.cell_axis import STEP, CellAxis
 from lumigraph.operators.sampling.optics import Optics
 
 Ways = tuple[range, range]

@@ -19,8 +19,6 @@ import numpy as np
 
 from lumigraph.core.threads import each
 from lumigraph.operators.lenslets.cell_response import (
-    STEP,
-    CellAxis,
     CellLenslets,
     focal_lengths,
     legendre,
@@ -28,6 +26,7 @@ from lumigraph.operators.lenslets.cell_response import (
     times_real,
 )
 from lumigraph.operators.lenslets.point_images import LensletPlaneWave, through
+from lumigraph.operators.sampling.cell_axis import STEP, CellAxis
 
 Pair = tuple[float, float]
 

@@ -13,16 +13,15 @@ import numpy as np
 import scipy.linalg
 
 from lumigraph.operators.lenslets.cell_response import (
-    STEP,
     CellLenslets,
     focal_lengths,
-    held,
     legendre,
     nodes,
     times_real,
 )
 from lumigraph.operators.lenslets.exact_lenslets import lenslets_of
 from lumigraph.operators.lenslets.lenslet_light import AROUND
+from lumigraph.operators.sampling.cell_axis import STEP, held
 from lumigraph.operators.sampling.optics import Optics
 
 FAINT = 1e-7, 1e-10

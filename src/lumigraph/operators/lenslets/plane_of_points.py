@@ -19,8 +19,8 @@ from lumigraph.operators.lenslets.paraxial_error import field_matters
 from lumigraph.operators.lenslets.part_images import PartImages, one_lens
 from lumigraph.operators.lenslets.part_plane import PartPlane
 from lumigraph.operators.lenslets.whole_planes import WholePlane
-from lumigraph.operators.periodic.kernels import A_MINUTE, LONGEST, said
 from lumigraph.operators.sampling.camera import CameraOptics
+from lumigraph.operators.sampling.time_limits import A_MINUTE, LONGEST, said
 from lumigraph.scene import Points
 
 SQUARE = 16

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from lumigraph.operators.lenslets.cell_response import STEP, CellAxis
 from lumigraph.operators.lenslets.point_light import point_light
 from lumigraph.operators.sampling.camera import CameraOptics
+from lumigraph.operators.sampling.cell_axis import STEP, CellAxis
 
 Line = Callable[[int], np.ndarray]
 """Blocks (points, samples) of the cells of one row, by their column."""

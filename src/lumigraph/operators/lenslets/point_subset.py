@@ -1,7 +1,7 @@
 """Images of the points of a cell behind lenslets of any shape, from few of the points.
 
 A field is band-limited in the point's place too, so that those of some points give those of all. What is
-faint besides, as where lenslets are missing, follows from the intensities of fewer points still (`ChosenPoints`).
+faint besides, as where lenslets are missing, follows from the intensities of still fewer (`ChosenPoints`).
 """
 
 import math
@@ -13,9 +13,9 @@ import numpy as np
 import scipy.linalg
 
 from lumigraph.core.threads import each
-from lumigraph.operators.lenslets.cell_response import CellAxis
 from lumigraph.operators.lenslets.lenslet_light import LensletLight, Row
 from lumigraph.operators.lenslets.point_images import Line, intensity, mirrored
+from lumigraph.operators.sampling.cell_axis import CellAxis
 
 AT_A_TIME = 2**20
 """Numbers worked on at a time."""

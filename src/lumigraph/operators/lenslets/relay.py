@@ -11,21 +11,14 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from lumigraph.operators.lenslets.cell_response import (
-    INFINITE,
-    MIDDLE,
-    STEP,
-    Box,
-    CellAxis,
-    CellLenslets,
-    Limits,
-)
+from lumigraph.operators.lenslets.cell_response import CellLenslets
 from lumigraph.operators.lenslets.exact_lenslets import ExactLenslets, lenslets_of
 from lumigraph.operators.lenslets.individual_lenslets import IndividualLenslets
 from lumigraph.operators.lenslets.line_parts import Key
 from lumigraph.operators.lenslets.lines import LineRelay
 from lumigraph.operators.lenslets.square_changes import CellNeighbourhood, CellNumbers
 from lumigraph.operators.sampling.camera import CameraOptics
+from lumigraph.operators.sampling.cell_axis import INFINITE, MIDDLE, STEP, Box, CellAxis, Limits
 from lumigraph.operators.sampling.optics import Optics
 
 TOGETHER = 4
@@ -181,7 +174,7 @@ class SeparableRelay:
         return [(which, cell, rows, columns) for cell in cells[which]]
 
     def piece(self, key: Key) -> np.ndarray:
-        """A matrix (terms, samples, window), by axis, cell and those around it; or some of its `CellNumbers`."""
+        """Matrix (terms, samples, window), by axis, cell and those around it; or some `CellNumbers` of it."""
         if key[0] in CellNumbers._fields:
             name, *seat = key
             return getattr(self._numbers_of(tuple(seat)), str(name))

@@ -15,8 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lumigraph.operators.lenslets.cell_response import Box, CellLenslets, LensletNodes, times_real
+from lumigraph.operators.lenslets.cell_response import CellLenslets, LensletNodes, times_real
 from lumigraph.operators.lenslets.exact_lenslets import between, interpolated
+from lumigraph.operators.sampling.cell_axis import Box
 
 FEWEST = 8
 """Places along a cell, and along a lenslet, that changes follow from at least."""

@@ -11,8 +11,9 @@ import numpy as np
 from scipy import fft
 
 from lumigraph.core import arrays
-from lumigraph.operators.lenslets.cell_response import CellAxis, CellLenslets, focal_lengths, legendre, nodes
+from lumigraph.operators.lenslets.cell_response import CellLenslets, focal_lengths, legendre, nodes
 from lumigraph.operators.sampling import cells as _cells
+from lumigraph.operators.sampling.cell_axis import CellAxis
 from lumigraph.operators.sampling.optics import Optics
 
 KEPT = 5.0

@@ -72,7 +72,7 @@ def refined(fine: int, points: int, accuracy: float, seen: Callable[[int], np.nd
 
 
 def bench_bytes(modes: int, cells: int, fine: int, points: int) -> float:
-    """Memory of images of points on so many lines at most on a `LensletBench`'s grid, in all threads [bytes]."""
+    """Memory of images of points on at most `points` lines of a `LensletBench`, in all threads [bytes]."""
     field, threads = 16.0 * modes + 64, min(arrays.WORKERS, points)
     # Points share one field if it moves by whole samples, and each thread holds its light.
     of_each = threads * field if fine % points else max(field, 8.0 * modes + 8 + 32 * threads)

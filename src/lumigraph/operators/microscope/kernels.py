@@ -199,9 +199,7 @@ def reach_of(objective: Objective, lenslet: Lenslet, dz: float, demand: KernelAc
 
 
 def margin_of(objective: Objective, lenslet: Lenslet, dz: float, demand: KernelAccuracy) -> float:
-    """`KernelAccuracy.margin`, more by powers of `DENSER` where a point lights many lenslets: more of what their
-    borders bend steeply meets.
-    """
+    """Margin of `KernelAccuracy`, more by powers of `DENSER` where a point lights many lenslets."""
     most = DENSER ** float(np.clip(-math.log10(demand.accuracy) - 2, 1, 2))
     return demand.margin * float(np.interp(_lit(objective, lenslet, dz), (2, 8), (1, most)))
 

@@ -21,7 +21,6 @@ from lumigraph.core import memory
 from lumigraph.core.arrays import WORKERS
 from lumigraph.core.progress import Progress, within
 from lumigraph.core.threads import each
-from lumigraph.operators.lenslets.cell_response import INFINITE, Limits
 from lumigraph.operators.lenslets.exact_lenslets import lenslets_of
 from lumigraph.operators.lenslets.lenslet_light import LensletLight, windows
 from lumigraph.operators.lenslets.point_images import (
@@ -48,6 +47,7 @@ from lumigraph.operators.sampling.border_classes import (
     places,
     terms,
 )
+from lumigraph.operators.sampling.cell_axis import INFINITE, Limits
 from lumigraph.operators.sampling.optics import Optics
 
 Offset = tuple[int, int]

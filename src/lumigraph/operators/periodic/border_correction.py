@@ -12,12 +12,13 @@ from typing import TypeVar
 import numpy as np
 
 from lumigraph.core.threads import each
-from lumigraph.operators.lenslets.cell_response import INFINITE, CellLenslets, Limits
+from lumigraph.operators.lenslets.cell_response import CellLenslets
 from lumigraph.operators.lenslets.lenslet_light import LensletLight
 from lumigraph.operators.lenslets.point_images import intensity
 from lumigraph.operators.lenslets.point_subset import ChosenPoints
 from lumigraph.operators.periodic.factors import FoundFactors, strongest
 from lumigraph.operators.sampling.border_classes import BorderState
+from lumigraph.operators.sampling.cell_axis import INFINITE, Limits
 from lumigraph.operators.sampling.cells import Cells, Offset
 
 AT_A_TIME = 64

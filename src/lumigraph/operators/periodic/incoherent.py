@@ -33,7 +33,6 @@ from lumigraph.core.linear import Chain, Linear, Shape, stack
 from lumigraph.core.progress import Progress
 from lumigraph.core.progress import part as part_of
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.operators.lenslets.cell_response import Pair
 from lumigraph.operators.lenslets.paraxial_error import field_matters, resolved
 from lumigraph.operators.lenslets.points import seen
 from lumigraph.operators.lenslets.tilted_planes import leaning_operator
@@ -47,6 +46,7 @@ from lumigraph.operators.periodic.streamed import StreamedMatrix
 from lumigraph.operators.sampling import field_lenses
 from lumigraph.operators.sampling.border_classes import Turn
 from lumigraph.operators.sampling.camera import CameraOptics, HasOptics
+from lumigraph.operators.sampling.cell_axis import Pair
 from lumigraph.operators.sampling.cells import Cells, blur, check_alike
 from lumigraph.operators.sampling.glass_distortion import Fields, seen_plane
 from lumigraph.operators.sampling.optics import Optics

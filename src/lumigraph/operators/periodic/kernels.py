@@ -5,7 +5,6 @@ light there has patterns: over a hundred in front of a lenslet, one or two far f
 """
 
 import math
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,13 +16,14 @@ from lumigraph.core import memory
 from lumigraph.core.cache import ByteCache
 from lumigraph.core.progress import Progress
 from lumigraph.core.threads import each
-from lumigraph.errors import SamplingError, SamplingWarning
+from lumigraph.errors import SamplingError
 from lumigraph.operators.periodic.blocks import MatrixPart, build
 from lumigraph.operators.periodic.glare import Glare, aside, glare
 from lumigraph.operators.periodic.sizes import build_bytes, build_operations, stream_operations
 from lumigraph.operators.periodic.streamed import StreamedMatrix, stream_bytes, streamed
 from lumigraph.operators.periodic.white import endless
 from lumigraph.operators.sampling.optics import Optics
+from lumigraph.operators.sampling.time_limits import A_MINUTE, LONGEST, said
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,11 +55,6 @@ _MATRICES = ByteCache()
 
 HELD = 2.0**32
 """Matrices that take more than this to build [bytes] are computed whenever they are applied."""
-
-LONGEST = 3e14
-"""Operations that building may take, or a streamed image: 50 minutes of one processor at 1e11 a second."""
-
-A_MINUTE = 6e12
 """Operations in a minute of that processor."""
 
 
@@ -105,16 +100,6 @@ def matrix(
 def operations(optics: Optics) -> float:
     """Multiply-adds of building it or, where it is streamed, of each image."""
     return build_operations(optics) if _held(optics) or not optics.straight else stream_operations(optics)
-
-
-def said(operations: float, what: str) -> None:
-    """Warn of what takes longer than a minute."""
-    if operations > A_MINUTE:
-        message = (
-            f"{what} some {operations / A_MINUTE:.2g} min of a processor that does 1e11 operations a second. "
-            "Ask for a coarser accuracy where that is too long."
-        )
-        warnings.warn(message, SamplingWarning, stacklevel=3)
 
 
 def _held(optics: Optics) -> bool:

@@ -15,10 +15,10 @@ import numpy as np
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.linear import Linear, Shape, Sum
-from lumigraph.operators.lenslets.cell_response import Pair
 from lumigraph.operators.lenslets.paraxial_error import NODE, half_field, weights
 from lumigraph.operators.sampling import cells as _cells
 from lumigraph.operators.sampling.camera import CameraOptics
+from lumigraph.operators.sampling.cell_axis import Pair
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -14,13 +14,13 @@ import numpy as np
 from lumigraph.core.grid import Grid
 from lumigraph.core.progress import Progress
 from lumigraph.core.threads import each
-from lumigraph.operators.lenslets.cell_response import MIDDLE
 from lumigraph.operators.lenslets.points import on_lenslets
 from lumigraph.operators.lenslets.relay import SeparableRelay, relay
 from lumigraph.operators.periodic.incoherent import PeriodicOperator
 from lumigraph.operators.periodic.screens import OPEN, PARTLY, Screen, Shadow
 from lumigraph.operators.sampling import cells as _cells
 from lumigraph.operators.sampling.camera import CameraOptics
+from lumigraph.operators.sampling.cell_axis import MIDDLE
 from lumigraph.operators.sampling.optics import Optics
 from lumigraph.operators.sampling.sample_weights import SampleWeights
 from lumigraph.operators.sampling.tiles import readout

@@ -5,9 +5,9 @@ from typing import Protocol
 
 import numpy as np
 
-from lumigraph.operators.lenslets.cell_response import Limits
 from lumigraph.operators.lenslets.point_images import Line, mirrored
 from lumigraph.operators.sampling.border_classes import BorderState
+from lumigraph.operators.sampling.cell_axis import Limits
 from lumigraph.operators.sampling.cells import Cells
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from lumigraph.elements import LensletArray
-from lumigraph.operators.lenslets.cell_response import INFINITE
 from lumigraph.operators.lenslets.exact_lenslets import terms_of
 from lumigraph.operators.periodic.border_correction import AT_A_TIME, HELD
 from lumigraph.operators.sampling import cells as _cells
@@ -21,6 +20,7 @@ from lumigraph.operators.sampling.border_classes import (
     places,
     terms,
 )
+from lumigraph.operators.sampling.cell_axis import INFINITE
 from lumigraph.operators.sampling.optics import Optics
 from lumigraph.operators.sampling.sampling_rules import tail
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
-from lumigraph.operators.lenslets.cell_response import INFINITE, Limits
 from lumigraph.operators.sampling import cells as _cells
+from lumigraph.operators.sampling.cell_axis import INFINITE, Limits
 from lumigraph.operators.sampling.optics import Optics
 
 Turn = tuple[bool, bool, bool]

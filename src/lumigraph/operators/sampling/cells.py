@@ -16,9 +16,9 @@ from lumigraph.elements.lens import lens_phase
 from lumigraph.elements.train import Element
 from lumigraph.elements.transmission import Thin, transmit
 from lumigraph.errors import GeometryError
-from lumigraph.operators.lenslets.cell_response import Accepted
 from lumigraph.operators.sampling import field_lenses
 from lumigraph.operators.sampling.camera import CameraOptics
+from lumigraph.operators.sampling.cell_axis import Accepted
 from lumigraph.operators.sampling.sampling_rules import Edges, SamplingRules
 
 ALIKE = (

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lumigraph.elements import LensletArray
-from lumigraph.operators.lenslets.cell_response import SLACK, CellAxis
 from lumigraph.operators.sampling import cells as _cells
 from lumigraph.operators.sampling.camera import CameraOptics, HasOptics
+from lumigraph.operators.sampling.cell_axis import SLACK, CellAxis
 from lumigraph.operators.sampling.cells import Cells
 from lumigraph.operators.sampling.sampling_rules import Edges, SamplingRules
 
-VERSION = 23
+VERSION = 24
 """Of what is kept on disk: to be raised with every change of the numbers."""
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lumigraph.cluster.ledger import Ledger, LedgerEntry
+from lumigraph.cluster.ledger import Entry, Ledger
 from lumigraph.errors import LumigraphError, SamplingWarning
 from lumigraph.instruments.instrument import Instrument
 from lumigraph.instruments.varied import changed
@@ -107,7 +107,7 @@ class Evaluations:
             row = {**item, ERROR: " ".join(str(error).split())}
         seconds = time.perf_counter() - began
         if self.ledger is not None:
-            self.ledger.record(LedgerEntry(len(self._noted) + self.computed, seconds, values=row))
+            self.ledger.record(Entry(len(self._noted) + self.computed, seconds, values=row))
         self.seconds, self.computed = self.seconds + seconds, self.computed + 1
         return row
 

@@ -80,8 +80,8 @@ class Goal:
     name
         "depth", "lateral" or "brightness", bounds of a point over the depths; "picture error" or "volume
         error", expected errors of reconstructed scenes, at each depth alone or at all at once; or "light
-        caught", a number that the camera's description prints, or one that `lumigraph.metrology.datasheet.simulated`
-        measures, such as "mtf@10/mm".
+        caught", a number that the camera's description prints, or one that
+        `lumigraph.metrology.datasheet.simulated` measures, such as "mtf@10/mm".
     largest
         Whether large is good.
     depths

@@ -8,7 +8,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from lumigraph.errors import LumigraphError
-from lumigraph.studies.thesis import beyond, microscope, registry
+from lumigraph.studies.thesis import beyond, figures, microscope, registry
 from lumigraph.studies.thesis.registry import Experiment
 
 

@@ -4,8 +4,8 @@
 - `making`: `built`, the camera with given errors; `drawn`, `cameras`: random errors, and such cameras.
 - `measures`: results of a camera as built beside those of its description; `single`: effects of single
   lenslets that differ.
-- `study`: many random cameras (`trials`) beside first-order sensitivities, a `Study` with an `ToleranceOutcome` for
-  each measure.
+- `study`: many random cameras (`trials`) beside first-order sensitivities, a `Study` with a
+  `ToleranceOutcome` for each measure.
 """
 
 from lumigraph.studies.tolerance.making import built, cameras, drawn

@@ -139,7 +139,7 @@ def study(
     draws
         Cameras drawn by chance.
     measure
-        Names of `measures`, or of `lumigraph.metrology.datasheet.simulated`, which takes minutes for each camera.
+        Names of `measures`, or of `lumigraph.metrology.datasheet.simulated`, minutes for each camera.
     seed
         Of all that is drawn: the same one draws the same.
     output
@@ -178,7 +178,8 @@ def study(
     items = trials.items(draws)
     if output is None:
         return Study.of(trials, [trials(item).row for item in items])
-    cluster.batch(trials, items, output, what=trials.what, workers=workers)
+    files = cluster.inputs.named_in(trials.camera)
+    cluster.batch(trials, items, output, what=trials.what, inputs=files, workers=workers)
     with cluster.rows(output) as rows:
         return Study.of(trials, rows)
 

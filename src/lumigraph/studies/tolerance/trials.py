@@ -1,4 +1,4 @@
-"""`ToleranceTrials`: computations on a camera with tolerances, item by item, in any order and on any machine."""
+"""`ToleranceTrials`: computations on a camera with tolerances, item by item, in any order."""
 
 import tomllib
 from collections.abc import Mapping, Sequence

@@ -33,7 +33,7 @@ _REAL = ("letters_plenoptic1", "letters_ULF_M1.png", "letters_ULF_M1_white.png")
     camera="thesis-plenoptic-1",
 )
 def run(context: Context) -> ExperimentOutcome:
-    """A defocused point, a scene of two depths, and a real raw image where lumigraphDATA has one."""
+    """A defocused point, a scene of two depths, and a real raw image where LUMIGRAPH_DATA has one."""
     camera = table_4_1.camera(context)
     context.progress(0.0, "defocused point")
     views = decode(table_4_1.point(camera, _DZ), camera.calibration)
@@ -121,7 +121,7 @@ def _scene_views(context: Context) -> LightField:
 
 
 def _real_folder() -> Path | None:
-    folder = os.environ.get("lumigraphDATA")
+    folder = os.environ.get("LUMIGRAPH_DATA")
     if not folder or not all((Path(folder) / _REAL[0] / name).exists() for name in _REAL[1:]):
         return None
     return Path(folder) / _REAL[0]
