@@ -61,7 +61,7 @@ def test_options_of_long_verbs_stand_in_sections(lumigraph, verb, titles):
 
 def test_a_file_in_the_place_of_a_verb_is_shown(lumigraph, tmp_path, monkeypatch):
     opened = []
-    monkeypatch.setattr("lumigraph.viewer.serve", lambda site, **options: opened.append(options["address"]))
+    monkeypatch.setattr("lumigraph.viewer.serve", lambda site, **options: opened.append(site))
     io.save(np.ones((30, 40), np.float32), tmp_path / "raw.tiff")
     assert lumigraph("raw.tiff", "--no-open").code == 0
     assert len(opened) == 1

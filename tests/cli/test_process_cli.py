@@ -1,14 +1,17 @@
 """`lumigraph process`, and `lumigraph.process`: everything from a raw image by one call."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
 
 import lumigraph as lg
 from data_folder import real
+from lumigraph.core.progress import silent
 from lumigraph.processing import recognise
 from lumigraph.processing.notes import mattering
+from lumigraph.processing.steps import Step, Steps
 
 FILES = {
     "all-in-focus.png", "calibration.toml", "depth.png", "depth.tiff", "notes.md", "page.html",
@@ -104,6 +107,21 @@ def test_the_kind_follows_from_the_camera_the_lattice_or_the_micro_images(bench)
         assert (found, guess.value) == (kind, kind)
         assert "the camera file describes a" in guess.reason
     assert recognise(raw, calibration)[0] == "plenoptic 1.0"
+
+
+def test_warnings_of_a_step_stay_with_it_and_others_are_not_swallowed(tmp_path):
+    def make(folder, progress):
+        warnings.warn("seen to slip by half a pitch", lg.SamplingWarning, stacklevel=2)
+        warnings.warn("another library", UserWarning, stacklevel=2)
+        (folder / "a.txt").write_text("a")
+
+    step = Step("a", ("a.txt",), make, "source")
+    with pytest.warns(UserWarning, match="another library") as seen:
+        assert Steps(tmp_path).run(step, silent)
+    assert len(seen) == 1
+    again = Steps(tmp_path)
+    assert not again.run(step, silent)
+    assert again.notes(step) == ["seen to slip by half a pitch"]
 
 
 def test_notes_that_all_is_well_are_left_out():

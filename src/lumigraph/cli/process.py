@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -106,4 +106,5 @@ def _figures(made: "Processed") -> "Iterator[Figure]":
     from lumigraph import io
 
     for name, caption in _PICTURES.items():
-        yield Figure(io.open(made.folder / name).data, caption)
+        picture: Any = io.open(made.folder / name)
+        yield Figure(picture.data, caption)

@@ -5,7 +5,7 @@
 - `recognise`: the kind of camera that took a raw image, with the reason for it
 - `views`, `patches`, `volume`: the steps of cameras 1.0 and views, of cameras 2.0, and of microscopes
 - `steps`: a folder that knows which of its files stand and are unchanged
-- `shown`: pictures and films of 8 bits, as people look at them
+- `shown`: pictures and films, as people look at them
 - `notes`: the page of notes
 """
 

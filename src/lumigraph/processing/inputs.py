@@ -7,6 +7,7 @@ from pathlib import Path
 
 from lumigraph import io
 from lumigraph.calibration import aligned, calibrate
+from lumigraph.core import checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
@@ -19,6 +20,7 @@ from lumigraph.instruments import Instrument, load_camera
 from lumigraph.instruments.capabilities import Rendered
 from lumigraph.preparation import prepare, read_calibration, read_raw, sharp_kinds
 from lumigraph.processing.recognise import Guess
+from lumigraph.rendering import check_arrangement
 
 Source = str | PathLike[str] | RawImage | Array
 """A file, or the raw image in it."""
@@ -151,6 +153,9 @@ def read(
         if path is not None:
             raise FormatError(f"{path} holds a {called(found)} where a raw image or views are needed.")
         found = RawImage(found)  # type: ignore[arg-type] - checked by RawImage
+    checks.finite_array("raw image" if path is None else str(path), found.data, FormatError)
+    if isinstance(found, LightField):
+        check_arrangement(found, "views" if path is None else str(path))
     described = camera if camera is None or isinstance(camera, Instrument) else load_camera(camera)
     maker = None if calibration is None else Path(calibration)
     known = Inputs(

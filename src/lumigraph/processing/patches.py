@@ -14,11 +14,10 @@ from lumigraph.core.progress import Progress
 from lumigraph.depth import PixelDepth, drawn, of_pixels
 from lumigraph.instruments import Instrument
 from lumigraph.instruments.capabilities import Rendered, WithDepth
-from lumigraph.processing.shown import FRAMES, save_film, save_picture
+from lumigraph.processing.shown import FRAMES, ends, save_film, save_picture
 from lumigraph.processing.steps import Step
 from lumigraph.rendering import render, render_stack
 
-_ENDS = 0.02, 0.98
 _SPARE = 0.25  # of the patches that occur, that a film goes beyond them on each side
 
 
@@ -66,8 +65,7 @@ class FromPatches:
     @cached_property
     def ends(self) -> tuple[float, float]:
         """Smallest and largest patch that occurs [px], but for a few."""
-        low, high = np.nanquantile(to_numpy(self.depth.lenslets.values), _ENDS)
-        return float(low), float(high)
+        return ends(self.depth.lenslets)
 
     def sizes(self) -> np.ndarray:
         """Patches of the film [px], somewhat beyond what is there, below the pitch and of one sign."""

@@ -1,6 +1,5 @@
 """`process`: everything from a raw image, by one call."""
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -11,7 +10,7 @@ from lumigraph import io
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress, Stage, silent, within
-from lumigraph.errors import FormatError, SamplingWarning
+from lumigraph.errors import FormatError
 from lumigraph.instruments import Instrument
 from lumigraph.io.target import write_bytes
 from lumigraph.processing import inputs
@@ -19,7 +18,7 @@ from lumigraph.processing.inputs import Inputs, Source
 from lumigraph.processing.notes import mattering, page
 from lumigraph.processing.patches import FromPatches
 from lumigraph.processing.recognise import Guess, Kind, recognise
-from lumigraph.processing.steps import RECORD, Step, Steps
+from lumigraph.processing.steps import RECORD, Step, Steps, heard
 from lumigraph.processing.views import FromViews
 from lumigraph.processing.volume import VOLUME, FromVolume
 from lumigraph.viewer import Exhibit, Origin, export
@@ -126,17 +125,15 @@ def process(
     ('views', True)
     """
     tell, place = progress or silent, _folder(folder)
-    given = inputs.read(raw, white=white, dark=dark, camera=camera, calibration=calibration)
     steps = Steps(place)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", SamplingWarning)
+    with heard() as told:
+        given = inputs.read(raw, white=white, dark=dark, camera=camera, calibration=calibration)
         plan, kept = _planned(given, steps, within(tell, 0.0, 0.2))
-        done = _run(plan.steps, steps, within(tell, 0.2, 0.8))
-        shown = Step("page", (PAGE,), lambda at, p: _write_page(plan, at, p), given.fingerprint)
-        done |= _run([shown], steps, within(tell, 0.8, 0.97))
-        about = plan.about()
-    told = (str(one.message) for one in caught if issubclass(one.category, SamplingWarning))
-    notes = mattering((*about, *plan.notes, *told))
+    done = _run(plan.steps, steps, within(tell, 0.2, 0.8))
+    shown = Step("page", (PAGE,), lambda at, p: _write_page(plan, at, p), given.fingerprint)
+    done |= _run([shown], steps, within(tell, 0.8, 0.97))
+    told += [note for step in (*plan.steps, shown) for note in steps.notes(step)]
+    notes = mattering((*plan.about(), *plan.notes, *told))
     made = [CALIBRATION] * (plan.kind != "views") + [name for step in plan.steps for name in step.files]
     files = (*made, PAGE, NOTES)
     text = page(given.name, plan.guesses, notes, files)

@@ -1,4 +1,4 @@
-"""Pictures and films of 8 bits, as people look at them."""
+"""Pictures and films, as people look at them."""
 
 from pathlib import Path
 
@@ -6,12 +6,23 @@ import numpy as np
 
 from lumigraph import io
 from lumigraph.core.arrays import Array, to_numpy
+from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.stack import Stack
 
 _WHITE = 0.999  # part of the pixels that are not brighter than white
+_TRUSTED, _ENOUGH = 0.5, 0.05  # confidence; part of the places
+_ENDS = 0.02, 0.98
 _LONGEST = 640  # pixels of a film
 FRAMES = 15
 """Pictures from one end of a film to the other."""
+
+
+def ends(found: DepthMap) -> tuple[float, float]:
+    """Range of a map but for a few of its values: of those that are trusted, where there are enough."""
+    values, trusted = to_numpy(found.values).astype(float), to_numpy(found.trusted(_TRUSTED)).astype(float)
+    known = trusted if np.isfinite(trusted).mean() > _ENOUGH else values
+    low, high = np.nanquantile(known, _ENDS)
+    return float(low), float(high)
 
 
 def save_picture(picture: Array, path: Path) -> None:

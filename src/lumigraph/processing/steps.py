@@ -1,14 +1,16 @@
 """A folder of results that knows which of its files stand and are unchanged."""
 
 import json
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 from lumigraph.core.progress import Progress
 from lumigraph.deconvolution.checkpoint import fingerprint
-from lumigraph.errors import FormatError
+from lumigraph.errors import FormatError, SamplingWarning
 from lumigraph.io.target import write_bytes
 
 RECORD = "process.json"
@@ -38,6 +40,20 @@ class Step:
     make: Callable[[Path, Progress], None]
     source: str
     share: float = 1.0
+
+
+@contextmanager
+def heard() -> Iterator[list[str]]:
+    """Context that gives a list of the texts of all sampling warnings, once it ends; others go on."""
+    notes: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SamplingWarning)
+        yield notes
+    for one in caught:
+        if issubclass(one.category, SamplingWarning):
+            notes.append(str(one.message))
+        else:
+            warnings.warn(one.message, one.category, stacklevel=3)
 
 
 class Steps:
@@ -83,10 +99,15 @@ class Steps:
         if self.stands(step):
             return False
         self.check(step)
-        step.make(self.folder, progress)
-        self._known[step.name] = {"source": _digest(step), "files": self._stamps(step)}
+        with heard() as notes:
+            step.make(self.folder, progress)
+        self._known[step.name] = {"source": _digest(step), "files": self._stamps(step), "notes": notes}
         write_bytes(self.folder / RECORD, json.dumps(self._known, indent=1).encode())
         return True
+
+    def notes(self, step: Step) -> list[str]:
+        """Warnings of the run that made a step."""
+        return self._known.get(step.name, {}).get("notes", [])
 
     def _stamps(self, step: Step) -> dict[str, list[int] | None]:
         return {name: _stamp(self.folder / name) for name in step.files}

@@ -14,15 +14,14 @@ from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.progress import Progress
 from lumigraph.depth import alpha_of, disparity_of, drawn, epi, measurable
 from lumigraph.errors import FormatError
-from lumigraph.processing.shown import FRAMES, save_film, save_picture
+from lumigraph.processing.shown import FRAMES, ends, save_film, save_picture
 from lumigraph.processing.steps import Step
 from lumigraph.rendering import AllInFocus, all_in_focus, decode, detail, focus_range, refocus_stack
 from lumigraph.viewer.exhibit import comfortable, grey_or_colour
 
 VIEWS = "views.zarr"
 _PLANES = 33  # refocus factors that are tried where views are too small for lines
-_SPARE = 0.5  # of the depths that occur, that a film goes beyond them on each side
-_ENDS = 0.02, 0.98
+_SPARE = 0.3  # of the depths that occur, that a film goes beyond them on each side
 _LEAST = 0.02  # refocus factor
 
 
@@ -79,9 +78,9 @@ class FromViews:
 
     def alphas(self) -> np.ndarray:
         """Refocus factors of the film, from near to far, somewhat beyond what is there."""
-        low, high = np.nanquantile(to_numpy(self.depth.values), _ENDS)
+        low, high = ends(self.depth)
         least, most = focus_range(self.shown)
-        spare = max(_SPARE * (high - low), 0.1 * (most - least))
+        spare = max(_SPARE * (high - low), 0.05 * (most - least))
         return np.linspace(max(low - spare, min(least, low)), min(high + spare, max(most, high)), FRAMES)
 
     def steps(self, source: str, *, decoded: bool) -> list[Step]:
@@ -112,7 +111,7 @@ class FromViews:
         """Notes on the pictures."""
         nv, nu, nt, ns = self.shown.data.shape[:4]
         times, relative = detail(self.shown), self._comfortable[1]
-        low, high = np.nanquantile(to_numpy((self.disparity if relative else self.depth).values), _ENDS)
+        low, high = ends(self.disparity if relative else self.depth)
         about = (
             f"disparities go from {low:.3g} to {high:.3g} px per view"
             if relative
