@@ -22,7 +22,7 @@ import numpy as np
 import lumigraph as lg
 from lumigraph import preparation, viewer
 from lumigraph.cli import main as lumigraph
-from lumigraph.viewer.exhibit import detail
+from lumigraph.rendering import detail
 
 DATA = Path(os.environ.get("LUMIGRAPH_DATA") or Path(__file__).parents[2] / "shared" / "data")
 PLANES = 5

@@ -76,7 +76,7 @@ def run() -> list[dict[str, Any]]:
         return []
     views: Any = lg.open(SCENE)
     start = time.process_time()
-    planes = lg.refocus_stack(views, np.linspace(0.9, 1.1, PLANES))
+    planes = lg.refocus_stack(views, np.linspace(0.9, 1.1, PLANES), oversample=1)
     rows = [_row("lumigraph, cubic shifts", time.process_time() - start, len(planes))]
     if (python := peer()) is None:
         return rows

@@ -80,6 +80,7 @@ from .preparation import (
     render_stack as render_stack,
     super_resolve as super_resolve,
 )
+from .processing import process as process
 from .propagation import (
     METHODS as METHODS,
     Propagate as Propagate,

@@ -65,12 +65,12 @@ def test_a_point_comes_into_focus_at_its_own_alpha_and_place(name, alpha):
     views = decode(raw, calibration)
     grid = views.lenslets
     truth = blob(grid.y[:, None], grid.x[None, :], at, width)
-    picture = refocus(views, alpha)
+    picture = refocus(views, alpha, oversample=1)
     # Cubic interpolation of this blob between lenslets errs by 5e-3; with alpha off by 0.03, or the shear's
     # sign wrong, by more than 0.05.
     # Along the edges of hexagonal cells, taps reach into the next micro-image: up to 0.04.
     np.testing.assert_allclose(picture, truth, atol=8e-3 if calibration.lattice.layout == "square" else 0.04)
-    wrong = refocus(views, 2 - alpha if alpha != 1 else 1.06)
+    wrong = refocus(views, 2 - alpha if alpha != 1 else 1.06, oversample=1)
     assert np.abs(wrong - truth).max() > 0.05
     # The centroid needs no interpolation to be right: the place is exact to a hundredth of a lenslet.
     weight = np.clip(picture, 0, None)
@@ -98,7 +98,7 @@ def test_the_sharpest_of_a_stack_is_the_true_one():
     width = 1.5 * 11.37 * PIXEL
     views = decode(blob(t - v * (1 - alpha), s - u * (1 - alpha), (0, 0), width), calibration)
     alphas = np.linspace(0.9, 1.2, 61)
-    peaks = refocus_stack(views, alphas).max((1, 2))
+    peaks = refocus_stack(views, alphas, oversample=1).max((1, 2))
     assert alphas[np.argmax(peaks)] == pytest.approx(alpha, abs=0.006)
 
 
@@ -108,7 +108,9 @@ def test_fourier_slice_and_shear_agree_away_from_the_borders():
     raw = blob(*(lenslet[..., k] - aperture[..., k] * 0.05 for k in (0, 1)), (0, 0), 2 * 11 * PIXEL)
     views = decode(raw, calibration)
     # Cubic interpolation is what differs; the slice without its kernel's correction would be 10 % off.
-    np.testing.assert_allclose(refocus_fourier(views, alpha), refocus(views, alpha), atol=1.5e-3)
+    np.testing.assert_allclose(
+        refocus_fourier(views, alpha), refocus(views, alpha, oversample=1), atol=1.5e-3
+    )
 
 
 def main_image(y, x):

@@ -20,35 +20,12 @@ from lumigraph.errors import SamplingWarning
 from lumigraph.instruments import load_camera
 
 VERBS = (
-    *(
-        "demo",
-        "design",
-        "information",
-        "simulate",
-        "calibrate",
-        "decode",
-        "render",
-        "refocus",
-        "depth",
-        "deconvolve",
-        "wavefront",
-        "measure",
-        "batch",
-        "sweep",
-        "optimise",
-        "tolerance",
-        "dataset",
-        "board",
-        "convert",
-        "chart",
-        "datasheet",
-        "twin",
-        "view",
-        "samples",
-    ),
-    "catalogue",
-    "reproduce",
-)
+    "process", "view", "calibrate", "decode", "render", "refocus", "depth", "deconvolve", "simulate",
+    "design", "information", "optimise", "tolerance", "sweep", "wavefront",
+    "measure", "board", "chart", "datasheet", "twin",
+    "batch", "dataset", "convert",
+    "demo", "samples", "catalogue", "reproduce",
+)  # fmt: skip
 PROGRAM = [sys.executable, "-c", "import sys; from lumigraph.cli import main; sys.exit(main())"]
 
 
@@ -58,6 +35,39 @@ def test_help_lists_every_verb_and_says_what_it_does(lumigraph):
     for verb in VERBS:
         assert f"│ {verb} " in result.out
     assert lumigraph().out == result.out
+
+
+def test_the_nine_everyday_verbs_come_first_and_the_others_in_groups(lumigraph):
+    lines = lumigraph("--help").out.splitlines()
+    titles = [line.strip("╭╮─ ") for line in lines if line.startswith("╭")]
+    assert titles == [*cli_app.GROUPS, "The program"]
+    words = [line.split()[1] for line in lines if line.startswith("│") and len(line.split()) > 1]
+    assert [word for word in words if word in VERBS][:9] == list(VERBS[:9])
+
+
+@pytest.mark.parametrize(
+    ("verb", "titles"),
+    [
+        ("refocus", ["Raw image", "Focus", "Picture", "Output"]),
+        ("simulate", ["Light", "Scene", "Output"]),
+        ("deconvolve", ["Raw image", "Object", "Method", "Adaptive optics", "Several raw images", "Output"]),
+    ],
+)
+def test_options_of_long_verbs_stand_in_sections(lumigraph, verb, titles):
+    lines = lumigraph(verb, "--help").out.splitlines()
+    found = [line.strip("╭╮─ ") for line in lines if line.startswith("╭")]
+    assert found == ["Arguments", "Parameters", *titles]
+
+
+def test_a_file_in_the_place_of_a_verb_is_shown(lumigraph, tmp_path, monkeypatch):
+    opened = []
+    monkeypatch.setattr("lumigraph.viewer.serve", lambda site, **options: opened.append(site))
+    io.save(np.ones((30, 40), np.float32), tmp_path / "raw.tiff")
+    assert lumigraph("raw.tiff", "--no-open").code == 0
+    assert len(opened) == 1
+    assert lumigraph("row.tiff").code == cli_app.USAGE
+    (tmp_path / "depth").write_bytes((tmp_path / "raw.tiff").read_bytes())
+    assert "depth needs --output" in lumigraph("depth", "raw.tiff").err  # a verb goes before a file
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -241,7 +251,7 @@ def test_decode_and_refocus(lumigraph, bench):
 
     assert lumigraph("refocus", "views.zarr", "--alpha", "1", "-o", "one.tiff").code == 0
     picture = io.open("one.tiff").data
-    assert picture.shape == views.data.shape[2:]
+    assert picture.shape == tuple(8 * (n - 1) + 1 for n in views.data.shape[2:])
     words = ("--white", "white.tiff", "--alpha", "1", "-o", "raw-one.tiff")
     result = lumigraph("refocus", "raw.tiff", *words)
     assert result.code == 0
@@ -265,7 +275,8 @@ def test_refocus_writes_stacks_and_folders(lumigraph, bench):
     assert (
         lumigraph("refocus", "views.zarr", "--alpha", "0.9", "--oversample", "3", "-o", "three.png").code == 0
     )
-    assert io.open("three.png").shape == tuple(3 * (n - 1) + 1 for n in pages[0].shape)
+    lenslets = io.open("views.zarr").data.shape[2:]
+    assert io.open("three.png").shape == tuple(3 * (n - 1) + 1 for n in lenslets)
     fourier = ("--method", "fourier", "--aperture", "0.5")
     assert lumigraph("refocus", "views.zarr", "--alpha", "0.95", *fourier, "-o", "f.png").code == 0
 

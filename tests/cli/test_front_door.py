@@ -17,7 +17,7 @@ from lumigraph.cli.options import COMMAND
 def test_a_wrong_verb_names_all_verbs_and_the_nearest(lumigraph):
     result = lumigraph("depht", "views.zarr")
     assert result.code == app.USAGE
-    assert "there is no verb 'depht'. Did you mean 'depth'? The verbs are demo, design," in result.err
+    assert "there is no verb 'depht'. Did you mean 'depth'? The verbs are process, view," in result.err
     assert result.err.rstrip().endswith("catalogue, reproduce; try 'lumigraph --help'.")
 
 

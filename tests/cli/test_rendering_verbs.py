@@ -105,6 +105,9 @@ def test_render_views_sharp_all_over(lumigraph, views):
     values = json.loads(result.out)
     assert values["alpha"][0] < 0.85 < 1.25 < values["alpha"][1]
     alpha, picture = io.open("alpha.tiff").data, io.open("sharp.tiff").data
+    times = (picture.shape[0] - 1) // (alpha.shape[0] - 1)
+    assert times == 8
+    picture = picture[::times, ::times]
     assert np.median(alpha[:, :14]) == pytest.approx(0.8, abs=0.02)
     assert np.median(alpha[:, 22:]) == pytest.approx(1.3, abs=0.02)
     np.testing.assert_allclose(picture[4:-4, 4:14], views.data[2, 2, 4:-4, 4:14], atol=0.1)

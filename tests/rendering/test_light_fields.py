@@ -118,7 +118,7 @@ def test_array_libraries_and_precision(xp, rng):
     pairs = [
         (ours.data, views.data),
         (encode(ours, calibration).data, encode(views, calibration).data),
-        (refocus(ours, 1.1), refocus(views, 1.1)),
+        (refocus(ours, 1.1, oversample=1), refocus(views, 1.1, oversample=1)),
         (refocus(ours, 0.9, oversample=2), refocus(views, 0.9, oversample=2)),
         (refocus_fourier(ours, 1.1), refocus_fourier(views, 1.1)),
         (render(xp.asarray(raw), calibration, 3.3), render(raw, calibration, 3.3)),
@@ -146,7 +146,7 @@ def test_gradients_of_linear_steps_are_their_adjoints(rng):
     calibration = calibrated(Lattice.square(7.3, 0.01, (30, 30)), (60, 60))
     for step in (
         lambda r: decode(r, calibration).data,
-        lambda r: refocus(decode(r, calibration), 1.13),
+        lambda r: refocus(decode(r, calibration), 1.13, oversample=1),
         lambda r: render(r, calibration, 3.4),
         lambda r: encode(decode(r, calibration), calibration).data,
     ):
@@ -165,7 +165,9 @@ def test_a_uniform_scene_stays_uniform_to_the_frame():
 
 def test_oversampled_pictures_hold_the_plain_ones(rng):
     views = field(rng)
-    np.testing.assert_allclose(refocus(views, 1.2, oversample=4)[::4, ::4], refocus(views, 1.2), atol=1e-12)
+    np.testing.assert_allclose(
+        refocus(views, 1.2, oversample=4)[::4, ::4], refocus(views, 1.2, oversample=1), atol=1e-12
+    )
 
 
 def test_whole_shifts_are_exact_means(rng):
@@ -175,16 +177,16 @@ def test_whole_shifts_are_exact_means(rng):
         0,
     )
     # alpha = 0: x = u, one lenslet per view. No camera has this plane.
-    np.testing.assert_allclose(refocus(views, 1e-12)[3:6, 3:6], expected, atol=1e-9)
+    np.testing.assert_allclose(refocus(views, 1e-12, oversample=1)[3:6, 3:6], expected, atol=1e-9)
 
 
 def test_stack_is_its_pictures(rng):
     views = field(rng, (4, 5, 9, 8, 3))
     alphas = [0.8, 1.0, 1.15]
-    stack = refocus_stack(views, alphas, interpolation="linear")
+    stack = refocus_stack(views, alphas, interpolation="linear", oversample=1)
     assert stack.shape == (3, 9, 8, 3)
     for picture, alpha in zip(stack, alphas, strict=True):
-        np.testing.assert_allclose(picture, refocus(views, alpha, interpolation="linear"))
+        np.testing.assert_allclose(picture, refocus(views, alpha, interpolation="linear", oversample=1))
 
 
 def test_fourier_slice_of_periodic_light_is_exact(rng):
@@ -269,13 +271,13 @@ def test_raw_images_that_do_not_belong_are_refused(read):
 def test_bad_numbers_are_refused(rng):
     views = field(rng)
     with pytest.raises(GeometryError, match=r"alpha is 0.* but must be above 0"):
-        refocus(views, 0)
+        refocus(views, 0, oversample=1)
     with pytest.raises(GeometryError, match="alphas is empty"):
-        refocus_stack(views, [])
+        refocus_stack(views, [], oversample=1)
     with pytest.raises(GeometryError, match="alpha is nan"):
         refocus_fourier(views, math.nan)
     with pytest.raises(LumigraphError, match="interpolation is 'nearest' but must be one of linear"):
-        refocus(views, 1.1, interpolation="nearest")
+        refocus(views, 1.1, interpolation="nearest", oversample=1)
     with pytest.raises(GeometryError, match="both numbers must be at least 1"):
         refocus(views, 1.1, oversample=0)
     with pytest.raises(GeometryError, match=r"no view \(5, 0\): the aperture has 5 x 5"):
@@ -326,7 +328,10 @@ def test_allocations_that_do_not_fit_are_refused_first(monkeypatch, rng):
             lambda: decode(np.ones((35, 42)), CALIBRATION),
             r"a light field of 7 x 7 views needs .* GiB but .* fewer",
         ),
-        (lambda: refocus_stack(views, [1.0] * 9), r"a stack of 9 pictures, 1 samples per lenslet needs"),
+        (
+            lambda: refocus_stack(views, [1.0] * 9, oversample=1),
+            r"a stack of 9 pictures, 1 samples per lenslet needs",
+        ),
         (lambda: refocus_fourier(views, 1.1), "the spectrum of the light field needs"),
         (
             lambda: render(np.ones((35, 42)), CALIBRATION, 3.0, samples=40),

@@ -33,7 +33,9 @@ def plainly(views, alpha, interpolation):
 def test_a_stack_is_the_mean_of_moved_views(rng, interpolation, shape):
     views = field(rng.random(shape))
     alphas = [0.3, 1.0, 1.4, 2.1]
-    for alpha, picture in zip(alphas, refocus_stack(views, alphas, interpolation=interpolation), strict=True):
+    for alpha, picture in zip(
+        alphas, refocus_stack(views, alphas, interpolation=interpolation, oversample=1), strict=True
+    ):
         inner = slice(6, -6)  # shifts of up to 2 x 1.1 lenslets, and three taps
         expected = plainly(views, alpha, interpolation)
         np.testing.assert_allclose(picture[inner, inner], expected[inner, inner], atol=1e-12)
@@ -47,8 +49,8 @@ REAL = ["?", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8", "
 def test_every_type_of_number_refocuses_to_the_same_picture(rng, dtype, masked):
     data = rng.integers(0, 100, (3, 4, 12, 13)).astype(dtype)
     valid = rng.random(data.shape) < 0.9 if masked else None
-    expected = refocus_stack(field(data.astype(float), valid), [0.8, 1.0])
-    found = refocus_stack(field(data, valid), [0.8, 1.0])
+    expected = refocus_stack(field(data.astype(float), valid), [0.8, 1.0], oversample=1)
+    found = refocus_stack(field(data, valid), [0.8, 1.0], oversample=1)
     assert found.dtype == (np.float64 if dtype in ("f8", ">f8", "g") else np.float32)
     np.testing.assert_allclose(found, expected, rtol=2e-5, atol=2e-4)
 
@@ -65,19 +67,19 @@ def test_complex_light_fields_refocus_part_by_part(rng, dtype):
 
 def test_complex_numbers_of_other_array_libraries_refocus_alike(xp, rng):
     data = rng.random((3, 3, 9, 8)) + 1j * rng.random((3, 3, 9, 8))
-    found = to_numpy(refocus_stack(field(xp.asarray(data)), [0.8, 1.2]))
-    np.testing.assert_allclose(found, refocus_stack(field(data), [0.8, 1.2]), atol=1e-12)
+    found = to_numpy(refocus_stack(field(xp.asarray(data)), [0.8, 1.2], oversample=1))
+    np.testing.assert_allclose(found, refocus_stack(field(data), [0.8, 1.2], oversample=1), atol=1e-12)
 
 
 def test_invalid_samples_do_not_count(xp, rng):
     views = rng.random((3, 3, 12, 13, 3)).astype(np.float32)
     valid = rng.random(views.shape[:4]) < 0.9
     even = np.where(valid[..., None], np.float32(2.0), np.float32(1e3))
-    stack = refocus_stack(field(xp.asarray(even), xp.asarray(valid)), [0.7, 1.0, 1.3])
+    stack = refocus_stack(field(xp.asarray(even), xp.asarray(valid)), [0.7, 1.0, 1.3], oversample=1)
     np.testing.assert_allclose(to_numpy(stack), 2.0, rtol=2e-5)
     everywhere = field(views, np.ones(views.shape[:4], bool))
-    plain = refocus_stack(field(views), [1.3])
-    np.testing.assert_allclose(refocus_stack(everywhere, [1.3]), plain, rtol=1e-5)
+    plain = refocus_stack(field(views), [1.3], oversample=1)
+    np.testing.assert_allclose(refocus_stack(everywhere, [1.3], oversample=1), plain, rtol=1e-5)
 
 
 def test_a_lenslet_without_any_valid_sample_takes_its_neighbours_light():
@@ -95,5 +97,5 @@ def test_a_mask_of_another_shape_is_refused(rng):
 
 def test_progress_counts_the_rows_of_views(rng):
     seen = []
-    refocus_stack(field(rng.random((3, 2, 8, 8))), [1.1], progress=seen.append)
+    refocus_stack(field(rng.random((3, 2, 8, 8))), [1.1], progress=seen.append, oversample=1)
     assert seen == [1 / 3, 2 / 3, 1]

@@ -35,14 +35,14 @@ PARTS = (slice(4, -4), slice(4, 20)), (slice(4, -4), slice(28, -4))
 
 def test_both_planes_are_sharp_in_one_picture(xp):
     views, seen = two_planes(xp), []
-    made = all_in_focus(views, np.linspace(0.8, 1.15, 15), progress=seen.append)
+    made = all_in_focus(views, np.linspace(0.8, 1.15, 15), progress=seen.append, oversample=1)
     picture, alpha = to_numpy(made.picture), to_numpy(made.alpha)
     assert type(made.picture) is type(views.data)
     for part, factor in zip(PARTS, (NEAR, FAR), strict=True):
         # Cubic interpolation keeps 97 % of the finest wave; a plane off by 0.05 loses half of the contrast.
         np.testing.assert_allclose(picture[part], truth()[part], atol=0.12)
         assert np.median(alpha[part]) == pytest.approx(factor, abs=0.01)
-        assert np.abs(to_numpy(refocus(views, 0.98))[part] - truth()[part]).max() > 0.3
+        assert np.abs(to_numpy(refocus(views, 0.98, oversample=1))[part] - truth()[part]).max() > 0.3
     assert seen[-1] == 1
     assert seen == sorted(seen)
 
@@ -50,26 +50,35 @@ def test_both_planes_are_sharp_in_one_picture(xp):
 def test_a_given_depth_is_used_and_its_gaps_are_filled():
     depth = np.where(LENSLETS.x[None, :] < 0, NEAR, FAR) * np.ones((40, 1))
     depth[10:14, 5:9] = np.nan
-    made = all_in_focus(two_planes(), depth=depth)
+    made = all_in_focus(two_planes(), depth=depth, oversample=1)
     for part in PARTS:
         np.testing.assert_allclose(made.picture[part], truth()[part], atol=0.05)
     assert np.isfinite(made.alpha).all()
-    even = all_in_focus(two_planes(), depth=np.full((40, 48), NEAR))
-    np.testing.assert_allclose(even.picture, refocus(two_planes(), NEAR), atol=1e-12)
+    even = all_in_focus(two_planes(), depth=np.full((40, 48), NEAR), oversample=1)
+    np.testing.assert_allclose(even.picture, refocus(two_planes(), NEAR, oversample=1), atol=1e-12)
 
 
 def test_what_cannot_be_sharp_is_refused():
     views = two_planes()
     for call, match in (
-        (lambda: all_in_focus(views), "neither given but one of them is needed"),
-        (lambda: all_in_focus(views, [1, 2, 3], depth=np.ones((40, 48))), "both given"),
-        (lambda: all_in_focus(views, [0.9, 1.1]), "a minimum needs three"),
-        (lambda: all_in_focus(views, [0.9, 1.0, 1.3]), "must ascend in equal steps"),
-        (lambda: all_in_focus(views, depth=np.ones((3, 3))), r"depth has shape \(3, 3\) but the views have"),
-        (lambda: all_in_focus(views, depth=np.zeros((40, 48))), "depth is 0 but refocus factors are above 0"),
-        (lambda: all_in_focus(views, depth=np.full((40, 48), np.nan)), "depth is NaN everywhere"),
+        (lambda: all_in_focus(views, oversample=1), "neither given but one of them is needed"),
+        (lambda: all_in_focus(views, [1, 2, 3], depth=np.ones((40, 48)), oversample=1), "both given"),
+        (lambda: all_in_focus(views, [0.9, 1.1], oversample=1), "a minimum needs three"),
+        (lambda: all_in_focus(views, [0.9, 1.0, 1.3], oversample=1), "must ascend in equal steps"),
         (
-            lambda: all_in_focus(views, depth=np.linspace(0.1, 99, 1920).reshape(40, 48)),
+            lambda: all_in_focus(views, depth=np.ones((3, 3)), oversample=1),
+            r"depth has shape \(3, 3\) but the views have",
+        ),
+        (
+            lambda: all_in_focus(views, depth=np.zeros((40, 48)), oversample=1),
+            "depth is 0 but refocus factors are above 0",
+        ),
+        (
+            lambda: all_in_focus(views, depth=np.full((40, 48), np.nan), oversample=1),
+            "depth is NaN everywhere",
+        ),
+        (
+            lambda: all_in_focus(views, depth=np.linspace(0.1, 99, 1920).reshape(40, 48), oversample=1),
             "need .* planes, above 512",
         ),
         (lambda: view_path(views, 0), "frames is 0"),
@@ -111,7 +120,7 @@ def test_apertures_of_any_shape():
     mask = np.zeros((7, 7), bool)
     mask[2, 5] = True
     one = reduce_aperture(views, shape=mask)
-    np.testing.assert_allclose(refocus(one, 1.0), views.data[2, 5])
+    np.testing.assert_allclose(refocus(one, 1.0, oversample=1), views.data[2, 5])
     valid = LightField(views.data, APERTURE, LENSLETS, 10.0, np.ones(views.data.shape, bool))
     assert reduce_aperture(valid, 0.5).valid.shape == reduce_aperture(views, 0.5).data.shape
 
@@ -153,9 +162,10 @@ def test_a_benchmark_scene_is_sharp_all_over():
     ]
     data = np.stack(pictures).reshape(9, 9, 120, 180).astype(np.float32)
     views = LightField(data, Grid((9, 9), 10.0), Grid((120, 180), 1.0), 10.0)
-    made = all_in_focus(views, 1 + np.linspace(-2.8, 3.2, 25) / 10)
+    made = all_in_focus(views, 1 + np.linspace(-2.8, 3.2, 25) / 10, oversample=1)
     inner = (slice(14, -14), slice(14, -14))
     error, plain = (
-        np.sqrt(np.mean((p - data[4, 4])[inner] ** 2)) for p in (made.picture, refocus(views, 1.0))
+        np.sqrt(np.mean((p - data[4, 4])[inner] ** 2))
+        for p in (made.picture, refocus(views, 1.0, oversample=1))
     )
     assert error < 0.35 * plain

@@ -6,8 +6,9 @@ import pytest
 import lumigraph as lg
 from lumigraph import viewer
 from lumigraph.cli import main
+from lumigraph.rendering import detail
 from lumigraph.viewer import opening
-from lumigraph.viewer.exhibit import detail, focal_stack, object_depths
+from lumigraph.viewer.exhibit import focal_stack, object_depths
 from viewer_pages import served
 
 

@@ -112,11 +112,11 @@ def test_finer_pictures_are_those_of_the_library(open_page, tmp_path, masked, rn
         order = [name for name in sent if "/views" in name]
         assert "tiles" not in order[0]  # the coarsest come first
         assert "tiles/" in order[-1]
-        assert np.abs(page.pixels() - levels(lg.refocus(views, 0.93))).max() <= LEVELS
+        assert np.abs(page.pixels() - levels(lg.refocus(views, 0.93, oversample=1))).max() <= LEVELS
         page.set(focus=1.12, aperture=0.6)
         page.set(focus=1.12, aperture=0.6)
         small = lg.reduce_aperture(views, 0.6)
-        assert np.abs(page.pixels() - levels(lg.refocus(small, 1.12))).max() <= LEVELS
+        assert np.abs(page.pixels() - levels(lg.refocus(small, 1.12, oversample=1))).max() <= LEVELS
 
 
 def test_only_the_part_on_the_screen_is_drawn(open_page, tmp_path):
@@ -139,7 +139,7 @@ def test_only_the_part_on_the_screen_is_drawn(open_page, tmp_path):
         height, width = found.shape[:2]
         assert height < 120
         assert width < 192
-        expected = levels(lg.refocus(large, 0.93))[top : top + height, left : left + width]
+        expected = levels(lg.refocus(large, 0.93, oversample=1))[top : top + height, left : left + width]
         assert np.abs(found - expected).max() <= LEVELS
 
 
@@ -156,7 +156,7 @@ def test_a_film_of_a_streamed_folder_is_as_fine_as_it_can_be(open_page, tmp_path
         assert pictures.shape == (25, 40, 64, 3)
         for k in (0, 9):
             alpha = low + (high - low) * (1 - np.cos(2 * np.pi * k / 25)) / 2
-            assert np.sqrt(((pictures[k] - levels(lg.refocus(views, alpha))) ** 2).mean()) < 20
+            assert np.sqrt(((pictures[k] - levels(lg.refocus(views, alpha, oversample=1))) ** 2).mean()) < 20
 
 
 def levels(picture):

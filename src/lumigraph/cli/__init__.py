@@ -6,7 +6,7 @@
 - `console`: results on standard output, progress on standard error
 - `reporting`: `--report` of every verb that computes
 - `serving`: where a page is served, and opening a browser
-- `demo`, `design`, `simulate`, `calibrate`, `decode`, `render`, `refocus`, `depth`, `deconvolve`,
+- `process`, `demo`, `design`, `simulate`, `calibrate`, `decode`, `render`, `refocus`, `depth`, `deconvolve`,
   `wavefront`, `measure`, `batch`, `sweep`, `dataset`, `board`, `chart`, `view`, `samples`, `catalogue`,
   `reproduce`: the verbs
 

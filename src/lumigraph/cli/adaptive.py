@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from cyclopts import Parameter
 
+from lumigraph.cli.options import section
 from lumigraph.core.progress import Progress
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
@@ -48,7 +49,7 @@ def indices(text: str) -> tuple[int, ...]:
     return tuple(dict.fromkeys(found))
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Adaptive optics"))
 @dataclass(frozen=True)
 class Adaptive:
     """Aberrations to find before the object.

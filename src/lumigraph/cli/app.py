@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from importlib.metadata import version
 from typing import get_args
 
-from cyclopts import App
+from cyclopts import App, Group
 from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownCommandError
 
 from lumigraph.cli.batch import batch
@@ -32,6 +32,7 @@ from lumigraph.cli.information import information
 from lumigraph.cli.measure import measure
 from lumigraph.cli.optimise import optimise
 from lumigraph.cli.options import COMMAND, PARAMETER, RENAMED, WARNED
+from lumigraph.cli.process import process
 from lumigraph.cli.refocus import refocus
 from lumigraph.cli.render import render
 from lumigraph.cli.reporting import telling
@@ -41,7 +42,7 @@ from lumigraph.cli.simulate import simulate
 from lumigraph.cli.sweep import sweep
 from lumigraph.cli.tolerance import tolerance
 from lumigraph.cli.twin import twin
-from lumigraph.cli.view import view
+from lumigraph.cli.view import is_shown, view
 from lumigraph.cli.wavefront import wavefront
 from lumigraph.core.printable import printable, printable_lines
 from lumigraph.errors import LumigraphError
@@ -51,26 +52,37 @@ FAILED, USAGE, INTERRUPTED = 1, 2, 130
 
 _LONGEST = 400  # characters of a line on standard error
 
-VERBS = (
-    demo, design, information, simulate, calibrate, decode, render, refocus, depth, deconvolve, wavefront,
-    measure, batch, sweep, optimise, tolerance, dataset, board, convert, chart, datasheet, twin, view,
-    samples, catalogue, reproduce,
-)  # fmt: skip
-"""Verbs in the order of their use."""
+GROUPS = {
+    "Every day": (process, view, calibrate, decode, render, refocus, depth, deconvolve, simulate),
+    "Design and study": (design, information, optimise, tolerance, sweep, wavefront),
+    "Bench and metrology": (measure, board, chart, datasheet, twin),
+    "Many frames": (batch, dataset, convert),
+    "Samples and thesis": (demo, samples, catalogue, reproduce),
+}
+"""Verbs by what people do, the everyday ones first."""
+
+VERBS = tuple(verb for group in GROUPS.values() for verb in group)
+"""All verbs."""
 
 
 app = App(
     name="lumigraph",
     help="Design, simulate and process light-field (plenoptic) cameras.\n\n"
-    "Lengths carry their unit, such as '150 um'. Every verb takes --json and --debug.",
+    "`lumigraph FILE` shows a file in the browser. Lengths carry their unit, such as '150 um'. "
+    "Every verb takes --json and --debug.",
     version=lambda: version("lumigraph"),
     help_format="markdown",
     suppress_keyboard_interrupt=False,
     result_action="return_value",
     default_parameter=PARAMETER,
+    group_commands=Group("The program", sort_key=len(GROUPS)),
+    group_arguments=Group("Arguments", sort_key=-2),
+    group_parameters=Group("Parameters", sort_key=-1),
 )
-for _number, _verb in enumerate(VERBS):
-    app.command(telling(_verb), sort_key=_number)
+for _place, (_title, _verbs) in enumerate(GROUPS.items()):
+    _group = Group(_title, sort_key=_place)
+    for _number, _verb in enumerate(_verbs):
+        app.command(telling(_verb), sort_key=_number, group=_group)
 app.register_install_completion_command(
     help="Complete verbs and options on Tab: writes a file for your shell, and a line to its start-up file."
 )
@@ -84,7 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments
         Without the program's name; those the program was started with if left out.
     """
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    words = _viewed(list(sys.argv[1:] if arguments is None else arguments))
     debug = "--debug" in words
     COMMAND.set(tuple(words))
     WARNED.set([])
@@ -124,6 +136,13 @@ def _explained(error: BaseException) -> tuple[int, str]:
             return FAILED, f"error: {where}{error.strerror or error}."
     what = f"{type(error).__name__}: {error}"
     return FAILED, f"error: unexpected {what[:300]}. Run it again with --debug and report the traceback."
+
+
+def _viewed(words: list[str]) -> list[str]:
+    """The words, with `view` before a file that stands in the place of a verb."""
+    known = {verb.__name__ for verb in VERBS}
+    first = words[0] if words else ""
+    return ["view", *words] if first not in known and is_shown(first) else words
 
 
 def _optional(text: str) -> str:

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from lumigraph.cli import files, standing
 from lumigraph.cli.console import line, progress
 from lumigraph.cli.frames import KINDS, Frames, items_of, runs
-from lumigraph.cli.options import COMMAND, COMMON, Common, Output
+from lumigraph.cli.options import COMMAND, COMMON, Common, Output, section
 from lumigraph.cli.standing import StatusPage
 from lumigraph.core import memory
 from lumigraph.core.result import Quantity, Result
@@ -33,7 +33,7 @@ _SHOWN = 5
 """Number of failures that are listed one by one."""
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Workers"))
 @dataclass(frozen=True)
 class WorkerOptions:
     """Workers that do the job.

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli.console import progress
 from lumigraph.cli.files import check_output
-from lumigraph.cli.options import Output, length
+from lumigraph.cli.options import Output, length, section
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Result
@@ -25,7 +25,7 @@ _ARRAY = ("lenslet_pitch", "micro_images")
 """Values of the array, which `Nominal` takes as their ratio."""
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Known beforehand"))
 @dataclass(frozen=True)
 class KnownCamera:
     """Camera properties that are known beforehand.

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, above_zero, length, pixels
+from lumigraph.cli.options import Output, above_zero, length, pixels, section
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import CalibrationError
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from lumigraph.core.raw import RawImage
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Known beforehand"))
 @dataclass(frozen=True)
 class CameraOptions:
     """Camera properties that are known beforehand.

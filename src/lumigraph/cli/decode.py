@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files, pictures
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output
+from lumigraph.cli.options import Output, section
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions, notes_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions, enlarged
 from lumigraph.core.result import Figure, Quantity, Result
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _MOST_SAMPLES = 64
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Sampling"))
 @dataclass(frozen=True)
 class SamplingOptions:
     """Sampling of the views.

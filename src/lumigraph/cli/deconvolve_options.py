@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from lumigraph.cli.options import above_zero, planes, region
+from lumigraph.cli.options import above_zero, planes, region, section
 from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lumigraph.instruments import Instrument
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Raw image"))
 @dataclass(frozen=True)
 class RawImageOptions:
     """Raw image and its corrections.
@@ -83,7 +83,7 @@ class RawImageOptions:
         return [("" if len(found) == 1 else f"-page-{k:0{digits}}", raw) for k, raw in found.items()]
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Object"))
 @dataclass(frozen=True)
 class ObjectOptions:
     """Sampling of the object.
@@ -107,7 +107,7 @@ class ObjectOptions:
         return None if self.depth is None else planes("--depth", self.depth)
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Method"))
 @dataclass(frozen=True)
 class MethodOptions:
     """Method of the deconvolution.

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, above_zero, length, numbers
+from lumigraph.cli.options import Output, above_zero, length, numbers, section
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions
 from lumigraph.cli.reporting import REPORTED, ReportOptions, enlarged
 from lumigraph.core.progress import Progress, silent
@@ -29,7 +29,7 @@ MAPS = (".pfm", ".tif", ".tiff", ".png", ".zarr", ".ply")
 _OF_RAW = ("dense", "correlation")
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Search"))
 @dataclass(frozen=True)
 class SearchOptions:
     """Method of measuring depth.
@@ -119,7 +119,7 @@ class _Measured:
     notes: tuple[str, ...] = ()
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Lengths"))
 @dataclass(frozen=True)
 class LengthOptions:
     """Lengths that convert a map to metres, if there is no camera file.
@@ -178,10 +178,10 @@ def depth(
     source
         Views (.zarr, .h5, a folder), or a raw image.
     output
-        Map (.pfm, .tiff, .zarr), its picture, near to far as white to black (.png), or points in space
-        (.ply). With a camera file (a microscope's too) or --focal-length depths from the focused plane [m],
-        positive farther from the objective;
-        else disparities [px per view], positive nearer, refocus factors, or patches [px].
+        Map (.pfm, .tiff, .zarr), its picture, near to far as white to black, as fine as 'lumigraph refocus'
+        makes pictures of the views (.png), or points in space (.ply). With a camera file (a microscope's too)
+        or --focal-length depths from the focused plane [m], positive farther from the objective; else
+        disparities [px per view], positive nearer, refocus factors, or patches [px].
     confidence
         File for the confidence of each place, from 0 to 1.
     min_confidence
@@ -281,6 +281,7 @@ def _save(made: _Measured, output: Path, points: tuple[float | None, float]) -> 
     from lumigraph import depth as verbs
     from lumigraph import io
     from lumigraph.core.arrays import to_numpy
+    from lumigraph.core.lightfield import LightField
 
     found, name = made.depth, output.name.lower()
     if name.endswith(".ply") and points[0] is not None:
@@ -292,11 +293,8 @@ def _save(made: _Measured, output: Path, points: tuple[float | None, float]) -> 
         )  # fmt: skip
         io.save(cloud, output)
     elif name.endswith(".png"):
-        values = to_numpy(found.values).astype(float)
-        low, high = np.nanquantile(values, (0.01, 0.99)) if np.isfinite(values).any() else (0.0, 1.0)
-        part = np.nan_to_num((values - low) / ((high - low) or 1))
-        nearer_is_more = found.quantity in ("disparity", "patch")
-        io.save(np.clip(part if nearer_is_more else 1 - part, 0, 1), output, white=1.0)
+        views = made.grounds if isinstance(made.grounds, LightField) else None
+        io.save(verbs.drawn(found, views), output, white=1.0)
     else:
         io.save(found, output)
 

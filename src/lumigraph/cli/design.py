@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from lumigraph.cli import files
+from lumigraph.cli.options import section
 from lumigraph.cli.reporting import REPORTED, ReportOptions, tell
 from lumigraph.cli.serving import Port, announce, check_port
 from lumigraph.core.result import Figure, Result
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from lumigraph.instruments import Description, Instrument
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Designer"))
 @dataclass(frozen=True)
 class DesignerOptions:
     """The designer's page.

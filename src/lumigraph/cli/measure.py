@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from cyclopts import Parameter
 
-from lumigraph.cli.options import above_zero, length, region
+from lumigraph.cli.options import above_zero, length, region, section
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lumigraph.core.raw import RawImage
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Region"))
 @dataclass(frozen=True)
 class RegionOptions:
     """Part of the pictures to measure.
@@ -50,7 +50,7 @@ class RegionOptions:
         return length("--pixel-pitch", self.pixel_pitch) or picture.pixel_pitch
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Dark images"))
 @dataclass(frozen=True)
 class DarkOptions:
     """Dark pictures and range of a sensor, for its flats.

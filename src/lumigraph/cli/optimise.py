@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files, optimised
 from lumigraph.cli.console import line, progress
-from lumigraph.cli.options import Output, length
+from lumigraph.cli.options import Output, length, section
 from lumigraph.cli.options import planes as planes_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Result
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from lumigraph.studies.optimisation import Goal
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Goal"))
 @dataclass(frozen=True)
 class GoalOptions:
     """Goal of the optimisation.
@@ -114,7 +114,7 @@ def _pictures(paths: Sequence[Path] | None) -> "list[np.ndarray]":
     return [grey(read_raw(one, "picture of a scene").data) for one in paths or ()]
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Search"))
 @dataclass(frozen=True)
 class OptimiserOptions:
     """Search for the optimum.

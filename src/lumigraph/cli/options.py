@@ -4,10 +4,12 @@ import math
 import re
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import cache
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from lumigraph.errors import FormatError
 from lumigraph.units import parse, spaced
@@ -24,7 +26,16 @@ WARNED: ContextVar[list[str]] = ContextVar("WARNED")
 """Warnings that it has printed."""
 
 
-@Parameter(name="*")
+_COUNTED, _LAST = count(), 1000
+
+
+@cache  # the options of one section may stand in several classes
+def section(title: str, *, last: bool = False) -> Group:
+    """Section of a verb's help: those of a verb stand in the order of their making, the last at the end."""
+    return Group(title, sort_key=_LAST if last else next(_COUNTED))
+
+
+@Parameter(name="*", group=section("Output", last=True))
 @dataclass(frozen=True)
 class Common:
     """Options of every verb.

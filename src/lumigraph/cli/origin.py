@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from lumigraph.cli.options import section
 from lumigraph.errors import CalibrationError, FormatError
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ Use = Literal["decode", "render"]
 """The verb that a camera's raw images are for; None for all of them."""
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Raw image"))
 @dataclass(frozen=True)
 class RawOptions:
     """Corrections and geometry of a raw image, for views, a picture or a volume.

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, lengths, numbers
+from lumigraph.cli.options import Output, lengths, numbers, section
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions, notes_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions, enlarged
 from lumigraph.core.progress import Progress
@@ -28,7 +28,7 @@ MOST_SHOWN = 24
 """Pictures in a report."""
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Focus"))
 @dataclass(frozen=True)
 class FocusOptions:
     """Focus: α' = F/F', below 1 nearer than the focused plane, 1 as recorded, above 1 farther.
@@ -80,7 +80,7 @@ def _check_alpha(alpha: float) -> None:
         raise FormatError(f"--alpha is {alpha:g} but must be a finite number above 0.")
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Picture"))
 @dataclass(frozen=True)
 class PictureOptions:
     """Method of making pictures.
@@ -94,7 +94,8 @@ class PictureOptions:
     aperture_shape
         Shape of the aperture: all views, those inside a circle, or those in a ring.
     oversample
-        Pixels per lenslet, for shear; away from the focused plane the views fill in the detail.
+        Pixels per lenslet, for shear; away from the focused plane the views fill in the detail. If left out,
+        a power of two, at most 8, that gives the picture 200 pixels along its longer side.
     interpolation
         Interpolation between lenslets, for shear.
     """
@@ -102,17 +103,25 @@ class PictureOptions:
     method: Literal["shear", "fourier"] = "shear"
     aperture: float = 1.0
     aperture_shape: Literal["square", "round", "ring"] = "square"
-    oversample: Annotated[int, Parameter(allow_leading_hyphen=True)] = 1
+    oversample: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None
     interpolation: Literal["linear", "cubic", "band_limited"] = "cubic"
 
     def check(self) -> None:
         """Refuse what no picture can be made with."""
         if not 0 < self.aperture <= 1:
             raise FormatError(f"--aperture is {self.aperture:g} but must be above 0 and at most 1.")
-        if not 1 <= self.oversample <= _MOST_SAMPLES:
+        if self.oversample is not None and not 1 <= self.oversample <= _MOST_SAMPLES:
             raise FormatError(f"--oversample is {self.oversample} but must be from 1 to {_MOST_SAMPLES}.")
-        if self.method == "fourier" and self.oversample != 1:
+        if self.method == "fourier" and self.oversample not in (None, 1):
             raise FormatError("--oversample has no meaning with --method fourier. Use --method shear.")
+
+    def samples(self, views: "LightField") -> int:
+        """Pixels per lenslet."""
+        from lumigraph import rendering
+
+        if self.method == "fourier":
+            return 1
+        return rendering.detail(views) if self.oversample is None else self.oversample
 
     def pictures(self, views: "LightField", alphas: list[float], shown: Progress) -> "list[Array]":
         """The pictures focused by each factor."""
@@ -124,7 +133,7 @@ class PictureOptions:
                 views,
                 alphas,
                 interpolation=self.interpolation,
-                oversample=self.oversample,
+                oversample=self.samples(views),
                 progress=shown,
             )
             return list(stack)
@@ -170,16 +179,22 @@ def refocus(
         source, notes = _light_field(views, origin)
         alphas = focus.chosen(camera, source)
         images = quality.pictures(source, alphas, shown)
-    shape = images[0].shape[:2]
+    shape, samples = images[0].shape[:2], quality.samples(source)
     values = (
         Quantity("alphas", alphas), Quantity("shape", shape, "px"), Quantity("method", quality.method),
-        Quantity("aperture", quality.aperture), Quantity("aperture_shape", quality.aperture_shape),
+        Quantity("samples_per_lenslet", samples), Quantity("aperture", quality.aperture),
+        Quantity("aperture_shape", quality.aperture_shape),
     )  # fmt: skip
     return Result(
         "Refocus", "Pictures refocused; α' above 1 is farther.", images,
-        tuple(f"alpha {alpha:g}: {shape[0]} x {shape[1]} px" for alpha in alphas), values,
+        tuple(f"alpha {alpha:g}: {shape[0]} x {shape[1]} px{told_of(samples)}" for alpha in alphas), values,
         lambda: _figures(images, alphas), notes, tuple(_write(images, alphas, output)),
     )  # fmt: skip
+
+
+def told_of(samples: int) -> str:
+    """Words on a picture of several samples per lenslet; none where there is one."""
+    return f", {samples} samples per lenslet" if samples > 1 else ""
 
 
 def _figures(images: list[Any], alphas: list[float]) -> "Iterator[Figure]":

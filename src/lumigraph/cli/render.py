@@ -8,9 +8,9 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, length, numbers
+from lumigraph.cli.options import Output, length, numbers, section
 from lumigraph.cli.origin import NO_ORIGIN, RawOptions
-from lumigraph.cli.refocus import MOST_SHOWN
+from lumigraph.cli.refocus import MOST_SHOWN, told_of
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.progress import Progress
 from lumigraph.core.result import Figure, Quantity, Result
@@ -29,7 +29,7 @@ _MOST_FINER = 8
 _MOST_FRAMES = 1000
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Raw images of cameras 2.0"))
 @dataclass(frozen=True)
 class TileOptions:
     """Raw images of a camera 2.0: how large the piece of each micro-image is, and how pieces are joined.
@@ -135,7 +135,7 @@ class TileOptions:
         return sharp_kinds(calibration, () if camera is None else camera.patches_on_raw(), origin.calibration)
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Views of cameras 1.0"))
 @dataclass(frozen=True)
 class ViewOptions:
     """Views of a camera 1.0: which picture is made of them.
@@ -331,5 +331,6 @@ def _from_views(views: "LightField", look: ViewOptions, output: Path, shown: Pro
     io.save(made.picture, output)
     rows, columns = made.picture.shape[:2]
     ends = list(extra.quantiles(0.01, 0.99))
-    text = f"{rows} x {columns} px, refocus factors from {ends[0]:.4g} to {ends[1]:.4g}"
+    told = told_of(rendering.detail(views))
+    text = f"{rows} x {columns} px{told}, refocus factors from {ends[0]:.4g} to {ends[1]:.4g}"
     return _RenderedPicture([made.picture], text, (Quantity("alpha", ends),), extra)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cyclopts import Parameter
 
 from lumigraph.cli import console, files
-from lumigraph.cli.options import COMMAND, WARNED, Common
+from lumigraph.cli.options import COMMAND, WARNED, Common, section
 from lumigraph.core.printable import printable
 from lumigraph.core.result import Result
 from lumigraph.errors import LumigraphError
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lumigraph.report import Page
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Output", last=True))
 @dataclass(frozen=True)
 class ReportOptions(Common):
     """Options of every verb that computes.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from lumigraph.cli.options import length
+from lumigraph.cli.options import length, section
 from lumigraph.core.progress import Progress
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError
@@ -23,7 +23,7 @@ MOST_STEPS = 30
 Shifts = tuple[tuple[float, float], ...]
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Several raw images"))
 @dataclass(frozen=True)
 class SeveralOptions:
     """Differences between raw images of one object.

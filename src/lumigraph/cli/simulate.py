@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import Output, length, lengths
+from lumigraph.cli.options import Output, length, lengths, section
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError, GeometryError, ParaxialWarning
@@ -40,7 +40,7 @@ _PARAXIAL = 0.01
 _COUNTS = {"snapshots": 100, "tilted": 64}
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Light"))
 @dataclass(frozen=True)
 class LightOptions:
     """Coherence and spectrum of the scene's light.
@@ -152,7 +152,7 @@ class LightOptions:
         return simulation.PartiallyCoherent(lamp, 1e-3 if self.accuracy is None else self.accuracy)
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Scene"))
 @dataclass(frozen=True)
 class SceneOptions:
     """Scene in front of the camera.

@@ -8,14 +8,14 @@ from cyclopts import Parameter
 
 from lumigraph.cli import files
 from lumigraph.cli.console import progress
-from lumigraph.cli.options import COMMON, Common
+from lumigraph.cli.options import COMMON, Common, section
 from lumigraph.cli.origin import RawOptions
 from lumigraph.cli.serving import Port, announce, check_port
 from lumigraph.core.result import Quantity, Result
 from lumigraph.errors import FormatError
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Raw image"))
 @dataclass(frozen=True)
 class ShownOptions(RawOptions):
     """Corrections and geometry of a raw image, for views or pictures.
@@ -43,7 +43,7 @@ class ShownOptions(RawOptions):
     patch: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=section("Page"))
 @dataclass(frozen=True)
 class PageOptions:
     """Display of the page.
@@ -93,6 +93,14 @@ class PageOptions:
         files.check_page(self.export)
 
 
+def is_shown(word: str) -> bool:
+    """True if a word in the place of a verb is a file, which `lumigraph FILE` shows."""
+    if not word or word.startswith("-"):
+        return False
+    path = Path(word)
+    return path.is_file() or (path.is_dir() and (path.suffix != "" or (path / "views.json").is_file()))
+
+
 def view(
     file: Path,
     beside: Path | None = None,
@@ -106,7 +114,7 @@ def view(
 
     Prints the page's address and ends with Ctrl-C. Only browsers on this computer can reach it.
 
-    Example: `lumigraph view views.zarr`
+    Example: `lumigraph view views.zarr`, or only `lumigraph views.zarr`
 
     Example: `lumigraph view raw.png --white white.png`
 

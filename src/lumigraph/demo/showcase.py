@@ -93,7 +93,7 @@ def _plenoptic(page: report.Page, folder: Path, living: Living | None, tell: Pro
     tell(Stage(0.96, "decoding"))
     views = decode(devignette(sample.raw, sample.white), shown.calibration)
     alphas = [camera.alpha(dz) for dz in depths]
-    pictures = {name: refocus(views, alpha) for name, alpha in zip(NAMES, alphas, strict=True)}
+    pictures = {name: refocus(views, alpha, oversample=1) for name, alpha in zip(NAMES, alphas, strict=True)}
     io.save(views, folder / "plenoptic_views.zarr")
     _save(folder, "plenoptic", shown, pictures)
     if living is not None:
@@ -104,7 +104,7 @@ def _plenoptic(page: report.Page, folder: Path, living: Living | None, tell: Pro
         section.figure(
             pictures[name], f"Focused on the {name} target, {_depth(dz)}: α' = {alpha:.3f}", zoom=5
         )
-    stopped = refocus(reduce_aperture(views, 0.4), 1.0)
+    stopped = refocus(reduce_aperture(views, 0.4), 1.0, oversample=1)
     section.figure(stopped, "Aperture stopped down to 40 %: more depth of field, more noise", zoom=5)
     rim, middle = views.data.shape[1] // 5, views.data.shape[0] // 2
     sides = rim, views.data.shape[1] - 1 - rim

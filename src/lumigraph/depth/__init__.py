@@ -4,7 +4,7 @@
 - `epi` (`pictures`, `sweep`, `lines`, `visible`, `vote`, `shading`): disparities by epipolar-plane images
 - `from_focus`: refocus factors by a focal stack; `BiasCurve` and `bias.unbiased` correct for diffraction
 - `correlation`, `dense`, `of_pixels` (`sightings`, `flat`): patch sizes of a plenoptic 2.0 camera
-- `fuse`: several maps as one; `metric`: metres, virtual depths, points in space
+- `fuse`: several maps as one; `metric`: metres, virtual depths, points in space; `drawn`: pictures of maps
 - `quantities`: disparities as refocus factors; all estimates return a `core.depth_map.DepthMap`
 - `expected`, `chance`, `repeats`: the error to expect; chance matches; repeating textures
 - `volume`, `smooth`: costs of labels; surfaces through uncertain values
@@ -15,6 +15,7 @@ from lumigraph.core.verb_module import make_callable
 from lumigraph.depth.bias import unbiased
 from lumigraph.depth.correlation import correlation
 from lumigraph.depth.dense import dense
+from lumigraph.depth.drawn import drawn
 from lumigraph.depth.epi import epi
 from lumigraph.depth.estimate import estimate
 from lumigraph.depth.from_focus import BiasCurve, from_focus, point_alpha, sharpness
@@ -34,6 +35,7 @@ __all__ = [
     "defocus",
     "dense",
     "disparity_of",
+    "drawn",
     "epi",
     "estimate",
     "from_focus",

@@ -179,7 +179,7 @@ def from_focus(
     Nayar & Nakagawa, "Shape from focus", IEEE PAMI 16, 824 (1994), with variance as the measure.
     """
     alphas = _even(alphas)
-    stack = np.asarray(to_numpy(refocus_stack(views, alphas)), float)
+    stack = np.asarray(to_numpy(refocus_stack(views, alphas, oversample=1)), float)
     stack = stack.mean(-1) if stack.ndim == 4 else stack
     contrast = _contrast(stack, checks.positive("window", window, "lenslets"))
     alpha = _peaks(contrast.reshape(len(alphas), -1), alphas).reshape(stack.shape[1:])

@@ -8,8 +8,8 @@ from lumigraph.instruments.camera import Camera
 from lumigraph.instruments.sees_volumes import VolumeGradients
 
 if TYPE_CHECKING:
-    from lumigraph.operators.lenslets.point_images import PointImages
     from lumigraph.operators.lenslets.part_leaning import TiltedImages
+    from lumigraph.operators.lenslets.point_images import PointImages
     from lumigraph.operators.lenslets.whole_planes import WholePlane
 
 

@@ -37,7 +37,7 @@ class Refocus(Panel):
         alpha, part = self.alpha.value, self.aperture.value
 
         def work(_: Progress) -> tuple[LightField, Any]:
-            return views, refocus(reduce_aperture(views, part) if part < 1 else views, alpha)
+            return views, refocus(reduce_aperture(views, part) if part < 1 else views, alpha, oversample=1)
 
         return work
 

@@ -4,13 +4,15 @@
   `pixels`, `kind_check`: hexagonal lattices onto a square grid, hot pixels, raw images of a camera 2.0
 - `views`, `paths`: views, points of view, apertures, mosaics; a point of view that moves
 - `arrangement`: views whose numbers do not say where they stand
-- `refocus`, `fourier_slice`, `sharp`, `focus_range`: refocused pictures; one that is focused everywhere
+- `refocus`, `fourier_slice`, `sharp`, `focus_range`, `detail`: refocused pictures; one that is focused
+  everywhere; how finely they are sampled
 - `focused`, `patches`, `kinds`, `super_resolution`: plenoptic 2.0 pictures, of patches of one size or many
 - `geometry`, `interpolate`: lengths in metres, rectangles of lenslets; values between samples
 """
 
 from lumigraph.rendering.arrangement import check_arrangement
 from lumigraph.rendering.decode import decode
+from lumigraph.rendering.detail import detail, finer
 from lumigraph.rendering.encode import encode
 from lumigraph.rendering.focus_range import focus_range, focus_span
 from lumigraph.rendering.focused import render, render_stack, rendered_grid, sight_grid
@@ -38,7 +40,9 @@ __all__ = [
     "arranged",
     "check_arrangement",
     "decode",
+    "detail",
     "encode",
+    "finer",
     "focus_range",
     "focus_span",
     "hot_pixels",

@@ -14,6 +14,7 @@ from lumigraph.core.arrays import A, Array, is_complex, is_numpy, like, namespac
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress
 from lumigraph.errors import GeometryError
+from lumigraph.rendering.detail import chosen
 from lumigraph.rendering.geometry import lit
 from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, take, taps, weighted
 from lumigraph.rendering.views import reduce_aperture
@@ -29,7 +30,7 @@ def refocus(
     *,
     aperture: float = 1.0,
     interpolation: Interpolation = "cubic",
-    oversample: int = 1,
+    oversample: int | None = None,
 ) -> A:
     r"""Picture (t, s[, c]) focused on the plane whose image lies at F' = F / alpha behind the main lens.
 
@@ -55,7 +56,9 @@ def refocus(
     oversample
         Samples per lenslet: views seen from different places fall between each other's lenslets, so a finer
         picture holds more detail where the plane is not that of the lenslets. The first and last samples
-        stay on the first and last lenslet: ((nt - 1) k + 1, (ns - 1) k + 1).
+        stay on the first and last lenslet: ((nt - 1) k + 1, (ns - 1) k + 1). If left out, a power of two, at
+        most 8, that gives the picture 200 pixels along its longer side (`lumigraph.rendering.detail`); 1
+        gives one sample per lenslet.
 
     Raises
     ------
@@ -82,7 +85,7 @@ def refocus_stack(
     *,
     aperture: float = 1.0,
     interpolation: Interpolation = "cubic",
-    oversample: int = 1,
+    oversample: int | None = None,
     progress: Progress | None = None,
 ) -> A:
     """Pictures (n, t, s[, c]) focused on one plane for each alpha; see `refocus`.
@@ -110,7 +113,7 @@ def refocus_stack(
         raise GeometryError(
             "alphas is empty but a stack needs at least one. Give a list of numbers such as 1.0."
         )
-    checks.shape("oversample", (oversample, oversample))
+    oversample = chosen(views, oversample)
     _check_memory(views, len(alphas), oversample)
     open_views = lit(views.data)
     planes = [_Plane.of(views, alpha, oversample, interpolation) for alpha in alphas]

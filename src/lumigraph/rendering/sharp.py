@@ -12,6 +12,7 @@ from lumigraph.core.arrays import Array, like, to_numpy
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.progress import Progress, within
 from lumigraph.errors import GeometryError
+from lumigraph.rendering.detail import chosen, finer
 from lumigraph.rendering.geometry import lit
 from lumigraph.rendering.interpolate import Interpolation, as_float, taps, weighted
 from lumigraph.rendering.refocus import refocus_stack, shifts
@@ -29,7 +30,7 @@ class AllInFocus(NamedTuple):
     Parameters
     ----------
     picture
-        (t, s[, c]).
+        (y, x[, c]), of some samples per lenslet.
     alpha
         Refocus factor of each place (t, s).
     confidence
@@ -49,6 +50,7 @@ def all_in_focus(
     depth: Array | None = None,
     window: float = 1.5,
     interpolation: Interpolation = "cubic",
+    oversample: int | None = None,
     progress: Progress | None = None,
 ) -> AllInFocus:
     r"""Picture that is focused at every place on what is there, with its map of refocus factors.
@@ -75,6 +77,8 @@ def all_in_focus(
         Standard deviation of the Gaussian mean [lenslets].
     interpolation
         "linear", "cubic" or "band_limited", between lenslets.
+    oversample
+        Samples of the picture per lenslet; chosen as by `refocus` if left out. The map keeps one.
     progress
         Called as ``progress(fraction)``.
 
@@ -101,7 +105,10 @@ def all_in_focus(
         factors = _given(depth, views)
         trust = np.ones(factors.shape)
     rest = within(progress, 0.0 if depth is not None else 0.5, 1.0)
-    picture = _blended(views, _planes(views, factors), factors, interpolation, rest)
+    times = chosen(views, oversample)
+    picture = _blended(
+        views, _planes(views, factors, times), finer(factors, times), (interpolation, times), rest
+    )
     kind = as_float(views.data)
     return AllInFocus(picture, like(factors, kind), like(trust, kind))
 
@@ -201,8 +208,11 @@ def _moved(picture: np.ndarray, down: float, right: float) -> np.ndarray:
     return picture
 
 
-def _planes(views: LightField, factors: np.ndarray) -> np.ndarray:
-    """Refocus factors so close that no view moves by more than half a lenslet from one to the next."""
+def _planes(views: LightField, factors: np.ndarray, times: int) -> np.ndarray:
+    """Refocus factors so close that no view moves by more than half a lenslet from one to the next.
+
+    A quarter in pictures of several samples per lenslet, where half of one would blur several samples.
+    """
     low, high = float(factors.min()), float(factors.max())
     used = lit(views.data)
     moves = 0.0
@@ -210,7 +220,7 @@ def _planes(views: LightField, factors: np.ndarray) -> np.ndarray:
         (views.aperture.y, views.aperture.x), (used.any(1), used.any(0)), views.lenslets.pitch, strict=True
     ):
         moves = max(moves, float(np.abs(positions[seen]).max(initial=0.0)) / pitch)
-    count = math.ceil((high - low) * moves / _STEP) + 1
+    count = math.ceil((high - low) * moves / (_STEP / min(times, 2))) + 1
     if count > _MOST_PLANES:
         raise GeometryError(
             f"the refocus factors from {low:.4g} to {high:.4g} need {count} planes, above {_MOST_PLANES}. "
@@ -223,15 +233,15 @@ def _blended(
     views: LightField,
     planes: np.ndarray,
     factors: np.ndarray,
-    interpolation: Interpolation,
+    how: tuple[Interpolation, int],
     progress: Progress,
 ) -> Array:
-    """Picture of the two planes next to each place's factor."""
+    """Picture of the two planes next to each place's factor (y, x); `how`: interpolation and oversample."""
     place = (factors - planes[0]) / (planes[1] - planes[0]) if len(planes) > 1 else np.zeros(factors.shape)
     total, tail = None, len(views.data.shape) - 4
     for first in range(0, len(planes), _PLANES_AT_ONCE):
         part = planes[first : first + _PLANES_AT_ONCE]
-        stack = refocus_stack(views, part, interpolation=interpolation)
+        stack = refocus_stack(views, part, interpolation=how[0], oversample=how[1])
         for k in range(len(part)):
             term = weighted(stack[k, ...], np.clip(1 - np.abs(place - first - k), 0, 1), tail)
             total = term if total is None else total + term

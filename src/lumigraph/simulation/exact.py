@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from lumigraph.core import arrays
-from lumigraph.core.progress import Progress
+from lumigraph.core.progress import Progress, Stage
 from lumigraph.core.progress import part as share
 from lumigraph.operators import CameraOptics, SingleLensOperator, single_lens, single_lens_operator
 from lumigraph.operators.lenslets import points
@@ -81,7 +81,7 @@ def _image_of(
     if screens and not isinstance(part, Diffuser):
         return hidden_image(plain, part, accuracy, progress, screens)
     if light is not None and isinstance(part, Slice):
-        return _lit(replace(plain, model="paraxial"), part, accuracy, light)
+        return _lit(replace(plain, model="paraxial"), part, accuracy, light, progress)
     if plain.lattice is None and not isinstance(camera, CameraOptics):
         return _without_lenslets(camera, part, accuracy)
     if isinstance(part, Diffuser):
@@ -107,17 +107,19 @@ def _image_of(
 
 
 def _lit(
-    camera: CameraOptics, part: Slice, accuracy: float, light: Coherent | PartiallyCoherent
-) -> tuple[np.ndarray, error.ReachedError]:
+    camera: CameraOptics, part: Slice, accuracy: float, light: Coherent | PartiallyCoherent,
+    progress: Progress,
+) -> tuple[np.ndarray, error.ReachedError]:  # fmt: skip
     """Image of a slice in coherent or partially coherent light (ny, nx), and its error."""
     reached = error.of_quadrature("coherent", accuracy).through(camera)
     amplitude = np.sqrt(arrays.to_numpy(part.intensity))
     if isinstance(light, PartiallyCoherent):
+        progress(Stage(0.0, "modes of the source"))
         modes = light.on(part.grid, part.dz, camera.wavelength)
         data = np.concatenate([arrays.to_numpy(field.data) for field in modes.fields])
         reached = reached.and_also(modes.error, f", {modes.count} modes to {modes.error:.2g}")
         amplitude = amplitude.astype(np.float32) * data
-    return coherent_image(camera, amplitude, part.grid, part.dz, accuracy), reached
+    return coherent_image(camera, amplitude, part.grid, part.dz, accuracy, progress), reached
 
 
 def _without_lenslets(

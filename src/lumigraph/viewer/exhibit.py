@@ -18,8 +18,6 @@ from lumigraph.errors import LumigraphError
 from lumigraph.instruments.capabilities import WithDepth
 from lumigraph.rendering import focus_range, focus_span
 
-_FEWEST_PIXELS = 200
-_MOST_DETAIL = 8
 _WIDEST, _COMFORTABLE = 0.8, 0.5  # spans of refocus factors about 1
 
 
@@ -126,20 +124,12 @@ def comfortable(views: LightField) -> tuple[LightField, bool]:
     return LightField(views.data, views.aperture, smaller, views.separation, views.valid), True
 
 
-def detail(views: LightField) -> int:
-    """Samples per lenslet that a small picture is shown with: a power of two, so that it has 200 pixels."""
-    times = 1
-    while times < _MOST_DETAIL and max(views.lenslets.shape) * times < _FEWEST_PIXELS:
-        times *= 2
-    return times
-
-
 def focal_stack(views: LightField, count: int = 33) -> Planes:
     """Pictures focused through the whole range, by `lumigraph.refocus_stack`."""
     from lumigraph.rendering import refocus_stack
 
     alphas = np.linspace(*focus_range(views), count)
-    data = refocus_stack(grey_or_colour(views), alphas, oversample=detail(views))
+    data = refocus_stack(grey_or_colour(views), alphas)
     return Planes(data, tuple(float(alpha) for alpha in alphas))
 
 

@@ -312,7 +312,7 @@ def _simulated(path: Path, tell: Progress) -> Exhibit:
         patches = PatchRange.of(camera, found) if isinstance(camera, Rendered) else None
         facts = (("Simulated", "by rays and the lenses' diffraction, without noise"),)
     else:
-        scene, used = samples.glowing(camera.object_grid, _depth(camera)), _quick(camera)
+        scene, used = samples.glowing(camera.object_grid, depth_reach(camera)), _quick(camera)
         raw, patches = simulate(used, scene, Incoherent(1e-2), progress=report), None
         how = "by wave optics to 1 %" if used is camera else "by rays, without diffraction"
         facts = (("Simulated", f"{how}, without noise"),)
@@ -328,7 +328,7 @@ def _quick(camera: "AnyCamera") -> "AnyCamera":
     return camera.replace(objective={"model": "rays"})
 
 
-def _depth(camera: "AnyCamera") -> float:
+def depth_reach(camera: "AnyCamera") -> float:
     """Distance from the focused plane to the nearest and the farthest part of the scene [m]."""
     known = {row.name: row.value for row in camera.quantities()}
     if "refocus range" in known:

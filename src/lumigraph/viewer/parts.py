@@ -11,13 +11,12 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
-from lumigraph.rendering import all_in_focus
+from lumigraph.rendering import all_in_focus, detail
 from lumigraph.rendering.geometry import lit
 from lumigraph.viewer.encoding import Coded, white_level
 from lumigraph.viewer.exhibit import (
     Exhibit,
     Planes,
-    detail,
     focal_stack,
     focus_range,
     grey_or_colour,
@@ -171,10 +170,11 @@ class Parts:
 
 
 def _sharp(views: LightField, depth: Any) -> np.ndarray:
-    """Every place focused on what is there, by its refocus factor."""
-    factors = np.where(_trusted(depth) > 0, to_numpy(depth.values), np.nan)
+    """Every place focused on what is there, by its refocus factor; no lens has one of 0 or less."""
+    known = (_trusted(depth) > 0) & (to_numpy(depth.values) > 0)
+    factors = np.where(known, to_numpy(depth.values), np.nan)
     factors = factors if np.isfinite(factors).any() else np.ones(factors.shape)
-    return to_numpy(all_in_focus(grey_or_colour(views), depth=factors).picture)
+    return to_numpy(all_in_focus(grey_or_colour(views), depth=factors, oversample=1).picture)
 
 
 def _trusted(depth: Any) -> np.ndarray:

@@ -45,7 +45,7 @@ def subject_focus(views: LightField) -> float:
     valid = None if views.valid is None else views.valid[:, :, rows, columns]
     grid = Grid(data.shape[2:4], views.lenslets.pitch)
     part = LightField(data, views.aperture, grid, views.separation, valid)
-    found = all_in_focus(part, alphas, window=_WINDOW).alpha
+    found = all_in_focus(part, alphas, window=_WINDOW, oversample=1).alpha
     return round(float(found[place[0] - rows.start, place[1] - columns.start]), 5)
 
 

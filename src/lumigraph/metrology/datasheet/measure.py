@@ -386,7 +386,7 @@ def _picture_noise(
             patch = camera.patch if camera is not None and known else ready.calibration.lattice.pitch / 3
             found = render(ready, ready.calibration, patch)
         else:
-            found = refocus(decode(ready, ready.calibration), 1.0)
+            found = refocus(decode(ready, ready.calibration), 1.0, oversample=1)
         return steady.inner(np.asarray(to_numpy(found), float))
 
     levels, squares = [], []

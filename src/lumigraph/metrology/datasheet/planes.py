@@ -69,7 +69,7 @@ def measured(ready: PreparedImage, *, rendered: bool) -> FoundDepth:
 def _pictured(views: LightField, value: float) -> np.ndarray:
     """Picture (y, x) of a camera 1.0 in focus at a disparity."""
     alpha = depth.alpha_of(_one(value, "disparity"), views)
-    return grey(refocus(views, float(to_numpy(alpha.values)[0, 0])))
+    return grey(refocus(views, float(to_numpy(alpha.values)[0, 0]), oversample=1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

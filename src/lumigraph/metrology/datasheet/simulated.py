@@ -94,7 +94,7 @@ def _measured(
     else:
         assert ready.calibration is not None  # prepared with one; in lengths, as refocusing needs them
         views = decode(ready, ready.calibration)
-        tried = planes.TriedChart(find_chart(planes.grey(refocus(views, _alpha(camera, dz)))))
+        tried = planes.TriedChart(find_chart(planes.grey(refocus(views, _alpha(camera, dz), oversample=1))))
     found = {entry.name: entry for entry in planes.of_chart(tried, spacing)}
     return {name: found[name] if name in found else _contrast(tried.chart, spacing, name) for name in names}
 

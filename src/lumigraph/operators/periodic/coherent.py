@@ -16,6 +16,7 @@ from numpy.polynomial import legendre
 
 from lumigraph.core import memory
 from lumigraph.core.grid import Grid
+from lumigraph.core.progress import Progress, Stage, silent, within
 from lumigraph.elements import ThinLens, ZernikePlate
 from lumigraph.errors import SamplingError
 from lumigraph.operators.lenslets.relay import relay
@@ -29,6 +30,7 @@ from lumigraph.operators.sampling.tiles import readout
 TOGETHER = 2.0**22
 """Places in the plane behind the main lens whose light is held at a time."""
 
+_IN_STOP = 0.5  # of the time, that light takes to the stop
 OVERSAMPLING = 1.5
 """How much closer than λL/(2D) a single lens' image is sampled, for a short kernel to the pixels."""
 
@@ -42,8 +44,9 @@ def is_followed(camera: HasOptics) -> bool:
 
 
 def coherent_image(
-    camera: HasOptics, amplitude: np.ndarray, grid: Grid, dz: float, accuracy: float
-) -> np.ndarray:
+    camera: HasOptics, amplitude: np.ndarray, grid: Grid, dz: float, accuracy: float,
+    progress: Progress = silent,
+) -> np.ndarray:  # fmt: skip
     """Raw image (ny, nx) of a plane's complex amplitude (..., y, x), which one wave along the axis has lit.
 
     Parameters
@@ -55,16 +58,19 @@ def coherent_image(
         leading axes add: they are coherent modes.
     accuracy
         How far lenslets' light is followed, as for incoherent light.
+    progress
+        Called as ``progress(fraction)``, with the number of modes and the memory of their light.
     """
     plain = camera.optics()
     distance, modes = plain.object_distance + dz, np.reshape(amplitude, (-1, *grid.shape))
     if plain.lattice is None:
-        return _on_sensor(plain, modes, grid, distance)
+        return _on_sensor(plain, modes, (grid, distance), progress)
     optics = Optics.of(plain, distance, accuracy)
     lenslets, (rows, columns), (ky, kx) = relay(optics), optics.cells.image, optics.cells.samples
     y, x = lenslets.places(range(rows), range(columns))
     stop = _Stop(plain, distance, grid, _farthest(y, x))
-    lights, image = stop.lights(modes), np.zeros((rows * ky, columns * kx), np.float32)
+    lights = stop.lights(modes, within(progress, 0.0, _IN_STOP))
+    image, rest = np.zeros((rows * ky, columns * kx), np.float32), within(progress, _IN_STOP, 1.0)
     step = max(1, int(rows * TOGETHER / (len(y) * len(x))))
     for first in range(0, rows, step):
         mine = range(first, min(first + step, rows))
@@ -72,23 +78,31 @@ def coherent_image(
         for light in stop.behind(lights, y, x):
             field = lenslets.field(light, mine, range(columns))
             image[mine.start * ky : mine.stop * ky] += np.abs(field) ** 2
+        rest(Stage(mine.stop / rows, stop.needs(len(modes))))
     return readout(optics).forward(image / np.float32(optics.image_scale**2))
 
 
-def _on_sensor(camera: CameraOptics, modes: np.ndarray, grid: Grid, distance: float) -> np.ndarray:
-    """Raw image in coherent light of a camera without lenslets."""
+def _on_sensor(
+    camera: CameraOptics, modes: np.ndarray, plane: tuple[Grid, float], progress: Progress
+) -> np.ndarray:
+    """Raw image of a camera without lenslets; `plane`: samples and distance of the modes."""
+    (grid, distance), rest = plane, within(progress, _IN_STOP, 1.0)
     pixels, pitch = camera.sensor.grid, _cells.airy(camera) / (2 * OVERSAMPLING)
     ny, nx = (math.ceil(size / pitch) + 2 * HALF_WIDTH + 2 for size in pixels.size)
-    plane = Grid(
+    image_grid = Grid(
         (ny, nx), (pitch, pitch), (-pixels.center[0], -pixels.center[1])
     )  # pixels are turned by 180°
-    stop, image = _Stop(camera, distance, grid, _farthest(plane.y, plane.x)), np.zeros((ny, nx), np.float32)
-    lights, step = stop.lights(modes), max(1, int(TOGETHER / nx))
+    stop, image = (
+        _Stop(camera, distance, grid, _farthest(image_grid.y, image_grid.x)),
+        np.zeros((ny, nx), np.float32),
+    )
+    lights, step = stop.lights(modes, within(progress, 0.0, _IN_STOP)), max(1, int(TOGETHER / nx))
     for first in range(0, ny, step):
         mine = slice(first, first + step)
-        for light in stop.behind(lights, plane.y[mine], plane.x):
+        for light in stop.behind(lights, image_grid.y[mine], image_grid.x):
             image[mine] += np.abs(light) ** 2
-    return averaged(plane, pixels, camera.sensor.fill_factor).forward(image)
+        rest(Stage(min(1.0, (first + step) / ny), stop.needs(len(modes))))
+    return averaged(image_grid, pixels, camera.sensor.fill_factor).forward(image)
 
 
 def _farthest(y: np.ndarray, x: np.ndarray) -> float:
@@ -109,13 +123,25 @@ class _Stop:
         self.v, self.u = half * np.sin(angles), half * x
         self.weight = share * (math.pi * half**2)
 
-    def lights(self, modes: np.ndarray) -> list[np.ndarray]:
-        """Light in the stop of each of several planes (modes, y, x), where they fit in memory."""
+    def size(self, count: int) -> float:
+        """Bytes of the light of some modes."""
+        return 8.0 * count * len(self.v) * len(self.u)
+
+    def needs(self, count: int) -> str:
+        """Number of modes and their memory, in words."""
+        return f"{count} modes, {memory.told(self.size(count))}" if count > 1 else ""
+
+    def lights(self, modes: np.ndarray, progress: Progress) -> list[np.ndarray]:
+        """Of each of several planes (modes, y, x), where they fit in memory."""
         memory.require(
-            8.0 * len(modes) * len(self.v) * len(self.u), f"light of {len(modes)} modes in the stop",
+            self.size(len(modes)), f"light of {len(modes)} modes in the stop",
             "Use fewer modes, a smaller object or a smaller stop.", SamplingError,
         )  # fmt: skip
-        return [self.light(mode) for mode in modes]
+        found = []
+        for mode in modes:
+            progress(Stage(len(found) / len(modes), self.needs(len(modes))))
+            found.append(self.light(mode))
+        return found
 
     def light(self, amplitude: np.ndarray) -> np.ndarray:
         """Light at the nodes, times their weights: for an even amplitude of 1, 1 arrives on the lenslets."""

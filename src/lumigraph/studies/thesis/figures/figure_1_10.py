@@ -45,7 +45,7 @@ def run(context: Context) -> ExperimentOutcome:
 
 def _rows(camera: PlenopticCamera, views: LightField, dz: float) -> list[ResultRow]:
     """Lenslets that the point lights along the middle row, and the picture as a sum of columns."""
-    picture, light = refocus(views, 1.0), views.data.mean((0, 1))
+    picture, light = refocus(views, 1.0, oversample=1), views.data.mean((0, 1))
     covered = abs(1 - camera.alpha(dz)) * camera.pupil_diameter / camera.lenslets.pitch
     if dz:
         seen, tolerance = _diameter(light), 0.1 * covered

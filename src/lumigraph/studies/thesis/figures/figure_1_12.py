@@ -31,7 +31,7 @@ def run(context: Context) -> ExperimentOutcome:
     raw = RawImage(context.cached("raw", lambda: simulate(camera, scene).data), camera.pixels.pixel_pitch)
     views = decode(raw, camera.calibration)
     array, cells = views_mosaic(views), lenslet_mosaic(views)
-    picture = refocus(views, 1.0)
+    picture = refocus(views, 1.0, oversample=1)
     return ExperimentOutcome(
         (*_layout_rows(camera, views), *_content_rows(camera, raw, views, scene)),
         (*_raw_figures(raw, scene, camera), *_view_figures(views, array, cells, picture)),
@@ -72,7 +72,7 @@ def _content_rows(camera: PlenopticCamera, raw: RawImage, views: LightField, sce
     back = encode(again, camera.calibration).data
     inner = slice(2 * _PIXELS, -2 * _PIXELS)
     error = float(np.abs(back - raw.data)[inner, inner].max() / raw.data.max())
-    picture, count = refocus(views, 1.0), views.data.shape[0]
+    picture, count = refocus(views, 1.0, oversample=1), views.data.shape[0]
     mean = views.data.mean((0, 1))
     rest = float(np.abs(picture - mean).max() / mean.max())
     likeness = _correlation(camera, picture, views.lenslets, scene)

@@ -77,6 +77,10 @@ def _panel(raw: np.ndarray, views: LightField) -> object:
     epi = views.data[:, :, views.data.shape[2] // 2].mean(0)
     wide = np.repeat(epi, max(1, ns // nu), 0)
     return plots.images(
-        [(np.sqrt(raw), "raw, amplitude"), (refocus(views, 1.0), "rendered"), (wide, "u over x")],
+        [
+            (np.sqrt(raw), "raw, amplitude"),
+            (refocus(views, 1.0, oversample=1), "rendered"),
+            (wide, "u over x"),
+        ],
         cmap="magma",
     )

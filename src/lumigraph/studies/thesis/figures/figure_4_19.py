@@ -31,7 +31,7 @@ def run(context: Context) -> ExperimentOutcome:
     pictures = {}
     for number, (name, alpha) in enumerate(alphas.items()):
         context.progress(0.4 + 0.2 * number, f"refocused on {name}")
-        pictures[name] = refocus(views, alpha)
+        pictures[name] = refocus(views, alpha, oversample=1)
     rows = [row for name in POINTS for row in _rows(camera, views, pictures, name)]
     energy = {name: float(picture.sum()) for name, picture in pictures.items()}
     rows += [

@@ -65,7 +65,7 @@ def _aperture_rows(camera: PlenopticCamera, views: LightField) -> list[ResultRow
     areas, light = [], []
     for fraction in _FRACTIONS:
         kept = reduce_aperture(views, fraction)
-        areas.append(1 / float(sharpness(refocus(kept, 1.0)[None])[0]))
+        areas.append(1 / float(sharpness(refocus(kept, 1.0, oversample=1)[None])[0]))
         light.append(float(kept.data.sum() / views.data.sum()))
     return [
         ResultRow(
@@ -142,7 +142,7 @@ def _figure(views: LightField, what: str) -> tuple[object, str]:
     central = views.data[middle - 1 : middle + 2, count // 2 - 1 : count // 2 + 2].mean((0, 1))
     left, right = (views.data[:, k].mean(0) for k in sides)
     pictures = [
-        (refocus(views, 1.0), "whole aperture"), (central, "central 3 x 3 views"),
+        (refocus(views, 1.0, oversample=1), "whole aperture"), (central, "central 3 x 3 views"),
         (left, "from the left"), (right, "from the right"),
     ]  # fmt: skip
     return plots.images(pictures, columns=4), f"4.8: {what}"

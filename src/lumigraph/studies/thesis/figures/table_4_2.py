@@ -68,7 +68,7 @@ def fixed_blocks(camera: PlenopticCamera) -> Calibration:
 
 def on_own_planes(views: LightField, alphas: np.ndarray) -> np.ndarray:
     """Sharpness of each picture as the thesis draws it: on its own plane x' = x/α', α'² times as large."""
-    return alphas**2 * sharpness(refocus_stack(views, alphas, interpolation="linear"))
+    return alphas**2 * sharpness(refocus_stack(views, alphas, interpolation="linear", oversample=1))
 
 
 def _depths(context: Context) -> np.ndarray:
@@ -114,7 +114,7 @@ def _fine(context: Context, camera: PlenopticCamera) -> Callable[[float, tuple[f
 
     def measure(dz: float, place: tuple[float, float]) -> float:
         views = decode(table_4_1.point(camera, dz, place), camera.calibration, directions=directions)
-        near = coarse[sharpness(refocus_stack(views, coarse)).argmax()]
+        near = coarse[sharpness(refocus_stack(views, coarse, oversample=1)).argmax()]
         return point_alpha(views, np.arange(near - 0.12, near + 0.121, step), oversample=oversample)
 
     return measure
@@ -183,7 +183,9 @@ def _stack_figures(camera: PlenopticCamera) -> list[tuple[object, str]]:
         views = decode(table_4_1.point(camera, dz), camera.calibration, directions=8)
         stacks[f"{dz / mm:+.0f} mm"] = (curve := on_own_planes(views, alphas)) / curve.max()
     views = decode(table_4_1.point(camera, depths[-1]), camera.calibration, directions=8)
-    blurred, sharp = (np.abs(np.fft.fftshift(np.fft.fft2(refocus(views, a)))) for a in (1.0, 1.15))
+    blurred, sharp = (
+        np.abs(np.fft.fftshift(np.fft.fft2(refocus(views, a, oversample=1)))) for a in (1.0, 1.15)
+    )
     middle = blurred.shape[0] // 2
     across = np.fft.fftshift(np.fft.fftfreq(blurred.shape[1]))
     spectra = {"α' = 1": blurred[middle] / blurred.max(), "refocused, α' = 1.15": sharp[middle] / sharp.max()}
