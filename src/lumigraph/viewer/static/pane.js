@@ -198,7 +198,7 @@ export class Pane {
     if (row < 0 || column < 0 || row >= image.ny || column >= image.nx || parts[0] === "") { this.readout.textContent = ""; return; }
     if (this.app.state.mode === "depth") {
       const found = this.model.depthAt(y, x);
-      if (found) parts.push(...depthTexts(this.model.about.depth, found));
+      if (found) parts.push(...depthTexts(this.model.about.depth, found, this.model.depthSpan()));
     } else {
       const start = (row * image.nx + column) * image.channels;
       const numbers = image.texture ? this.device.sample(image, column, row) : image.numbers.subarray(start, start + image.channels);
