@@ -30,7 +30,7 @@ NAMES = ("leaves", "robot", "wall")
 
 VIEWS_PAGE, VOLUME_PAGE = "still_life.html", "helix.html"
 
-SIZE, VIEWS = (198, 352), 11
+SIZE, VIEWS = (180, 320), 9
 LENSLETS = (31, 45)
 GAMMA = 1.4
 BRIGHTEST = 99.8

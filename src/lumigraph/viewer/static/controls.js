@@ -133,6 +133,8 @@ export class Controls {
     if (state.mode !== "depth") this.histogram.draw(model, state, this.app.main.image);
     for (const id of ["ev", "black", "gamma"]) by(id).value = state[id];
     tell("ev-out", `${state.ev > 0 ? "+" : ""}${state.ev.toFixed(2)} EV`);
+    by("pick-grey").hidden = channels !== 3;
+    for (const what of ["grey", "exposure"]) by(`pick-${what}`).setAttribute("aria-pressed", String(this.app.picking === what));
     tell("black-out", `${Math.round(100 * state.black)} %`);
     tell("gamma-out", state.gamma.toFixed(2));
     for (const id of ["shape", "projection", "channel", "drag"]) by(id).value = state[id];

@@ -9,6 +9,7 @@ import { drawMeasures, regionText, samplesOf } from "./measures.js";
 import { clearOverlay, depthTexts, lengthText, drawCross, drawLattice, drawMark, drawScaleBar } from "./overlay.js";
 import { drawAxes } from "./rays.js";
 import { drawSections, panelAt, samplesAt } from "./sections.js";
+import { picked } from "./picking.js";
 import { toneOf } from "./tone.js";
 import { turned } from "./turning.js";
 
@@ -249,7 +250,16 @@ export class Pane {
     this.marked = this.marked ? null : place;
   }
 
+  /** Makes a place grey, or as bright as middle grey. */
+  pick(what, place) {
+    const found = picked(this, what, place);
+    if (found) this.app.set(found);
+    else this.app.tell("There is too little light, or no colour, to set that by.");
+  }
+
   click(place) {
+    const { picking } = this.app;
+    if (picking) { this.app.pickBy(null); this.pick(picking, place); return; }
     if (this.app.state.drag !== "move") { this.mark(place); return; }
     if (this.image?.sections) { this.cut(place); return; }
     if (this.app.state.sharp) { this.app.tell("Everything is in focus. Uncheck “All in focus” to choose."); return; }
