@@ -30,8 +30,8 @@ NAMES = ("leaves", "robot", "wall")
 
 VIEWS_PAGE, VOLUME_PAGE = "still_life.html", "helix.html"
 
-SIZE, VIEWS = (180, 320), 9
-LENSLETS = (31, 45)
+SIZE, VIEWS = (168, 300), 9
+LENSLETS = (27, 39)
 GAMMA = 1.4
 BRIGHTEST = 99.8
 """Percentile of a picture that is shown as white."""
@@ -98,8 +98,11 @@ def _still_life(page: report.Page, folder: Path, living: Living | None, tell: Pr
     section.figure(left, "From one side of the lens: one view (sub-aperture image), sharp at every depth")
     section.figure(right, "From the other side: the leaves have moved against the wall")
     tell(Stage(0.8, "depth"))
-    found = plots.show(depth.epi(views), title="Disparity, measured", label="disparity [px per view]")
-    section.figure(found, "Depth from the views alone: nearer places have larger disparities")
+    if living is not None:  # its page holds the depth already
+        section.frame(f"{VIEWS_PAGE}#mode=depth", "Depth, measured from the views, in the viewer")
+    else:
+        found = plots.show(depth.epi(views), title="Disparity, measured", label="disparity [px per view]")
+        section.figure(found, "Depth from the views alone: nearer places have larger disparities")
 
 
 def alphas(views: LightField) -> list[float]:
@@ -139,7 +142,7 @@ def _focused(page: report.Page, folder: Path, tell: Progress) -> None:
         "picture; the patch's size decides which depth fits together, and blended neighbours blur the others."
     )
     section = page.section("What its sensor recorded")
-    section.figure(shown(sample.raw.data), "Raw image: 45 × 31 micro-images")
+    section.figure(shown(sample.raw.data), f"Raw image: {LENSLETS[1]} × {LENSLETS[0]} micro-images")
     rows, columns = (n // 2 for n in sample.raw.shape)
     half = int(3.5 * found.lattice.pitch)
     part = sample.raw.data[rows - half : rows + half, columns - half : columns + half]
