@@ -123,3 +123,9 @@ def test_writing_replaces_and_needs_the_folder(tmp_path, page):
     assert len(list(tmp_path.iterdir())) == 1
     with pytest.raises(FormatError, match=r"folder .*nowhere for r.html does not exist"):
         page.write(tmp_path / "nowhere" / "r.html")
+
+
+def test_a_page_shows_another_in_a_frame():
+    page = Page("two")
+    page.section("one").frame("other.html#mode=depth", "The other")
+    assert '<iframe src="other.html#mode=depth" title="The other"' in page.html()

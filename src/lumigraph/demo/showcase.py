@@ -30,7 +30,7 @@ NAMES = ("leaves", "robot", "wall")
 
 VIEWS_PAGE, VOLUME_PAGE = "still_life.html", "helix.html"
 
-SIZE, VIEWS = (168, 300), 9
+SIZE, VIEWS = (160, 284), 9
 LENSLETS = (27, 39)
 GAMMA = 1.4
 BRIGHTEST = 99.8

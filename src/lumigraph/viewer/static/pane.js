@@ -82,6 +82,7 @@ export class Pane {
     }
     const image = this.model.image(state, this.device, settled);
     if (!image) return this.blank();
+    if (!this.device && !image.early) return this.blank(); // a written page shows only its poster before it has a device
     if (this.device && !this.device.fits(image)) return this.app.tell(`${image.nx} × ${image.ny} pixels are too many for this graphics processor.`, true);
     const view = { ...this.layout(image), smooth: state.smooth && !image.sharp && this.scale[0] / image.detail < 24, ground: this.app.ground };
     this.tone = this.toneFor(state, image);
