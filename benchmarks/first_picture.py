@@ -1,6 +1,6 @@
 """Time, commands and sharpness of the first picture that `lumigraph process` makes of real raw images.
 
-`python -m benchmarks.first_picture [letters raytrix vesicle]` needs the real data (lumigraphDATA). For each
+`python -m benchmarks.first_picture [letters raytrix vesicle]` needs the real data (LUMIGRAPH_DATA). For each
 raw image: the command and the words that a newcomer types until the folder is complete, CPU seconds of the
 first run and of a second one, which keeps what stands, the files that are missing, and the sharpness of
 all-in-focus.png beside that of a picture by hand (refocus or render with options chosen by eye, deconvolve).
@@ -23,7 +23,7 @@ import numpy as np
 
 import lumigraph as lg
 
-DATA = Path(os.environ.get("lumigraphDATA") or Path(__file__).parents[2] / "shared" / "data")
+DATA = Path(os.environ.get("LUMIGRAPH_DATA") or Path(__file__).parents[2] / "shared" / "data")
 FILES = (
     "all-in-focus.png",
     "depth.png",

@@ -43,17 +43,6 @@ def row(pictures: list[tuple[np.ndarray, str]], name: str, height: float = 2.6) 
     save(figure, name)
 
 
-def film() -> None:
-    """Pull the focus from the leaves to the wall and back: refocus.gif."""
-    views = lg.samples.scene((144, 192)).views
-    ends = np.concatenate([np.linspace(1.9, -1.5, 14), np.linspace(-1.5, 1.9, 14)[1:-1]])
-    step = views.lenslets.pitch[1] / views.aperture.pitch[1]
-    frames = lg.refocus_stack(views, 1 - np.sort(ends)[::-1] * step)
-    order = np.argsort(np.argsort(-ends, kind="stable"), kind="stable")
-    pictures = np.round(255 * shown(frames)).astype(np.uint8)
-    lg.save([pictures[k] for k in order], STATIC / "refocus.gif", fps=10)
-
-
 def first() -> None:
     """A raw image of 9 x 9 pixels to a lenslet, two refocused pictures and depth: first.png."""
     sample = lg.samples.scene()
@@ -160,7 +149,7 @@ def screenshot(command: list[str], name: str) -> None:
             server.terminate()
 
 
-PICTURES = (film, first, bench, microscope, design, viewer, designer)
+PICTURES = (first, bench, microscope, design, viewer, designer)
 
 
 if __name__ == "__main__":

@@ -125,3 +125,9 @@ def test_writing_replaces_and_makes_the_folder(tmp_path, page):
     assert (tmp_path / "new" / "folder" / "r.html").exists()
     with pytest.raises(FormatError, match=r"r.html is a file, not a folder for s.html"):
         page.write(tmp_path / "r.html" / "s.html")
+
+
+def test_a_page_shows_another_in_a_frame():
+    page = Page("two")
+    page.section("one").frame("other.html#mode=depth", "The other")
+    assert '<iframe src="other.html#mode=depth" title="The other"' in page.html()

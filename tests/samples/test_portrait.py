@@ -63,3 +63,15 @@ def test_the_white_image_is_that_of_waves():
 def test_other_cameras_are_refused():
     with pytest.raises(lg.GeometryError, match="must be a PlenopticCamera or FocusedPlenopticCamera"):
         lg.samples.portrait(lg.load_camera("thesis-2f"))  # type: ignore[arg-type]  # it is refused
+
+
+def test_the_luminance_of_a_raw_image_in_colour_is_the_grey_one():
+    camera = lg.load_camera("thesis-plenoptic-2-m025").replace(
+        lenslets={"count": (7, 9)}, sensor={"shape": None}
+    )
+    grey, colour = (lg.samples.portrait(camera, colour=colour) for colour in (False, True))
+    data = np.asarray(colour.raw.data)
+    assert data.shape == (*grey.raw.data.shape, 3)
+    assert np.ptp(data / data.sum(-1, keepdims=True).clip(1e-6), axis=-1).max() > 0.3
+    np.testing.assert_allclose(data @ (0.2126, 0.7152, 0.0722), grey.raw.data, atol=2e-3 * data.max())
+    np.testing.assert_array_equal(colour.white.data, grey.white.data)

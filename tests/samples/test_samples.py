@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
-from lumigraph.demo.showcase import parallax
 
 
 @pytest.fixture(scope="module")
@@ -78,24 +77,3 @@ def test_wrong_requests_are_refused(call, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(lg.LumigraphError, match=message):
         call()
-
-
-@pytest.mark.long
-def test_the_caption_of_the_other_side_is_what_the_pictures_show():
-    bench = lg.samples.bench()
-    views = lg.decode(lg.devignette(bench.raw, bench.white), lg.calibrate(
-        bench.white, separation=bench.camera.separation, lenslet_distance=bench.camera.lenslet_distance
-    ))  # fmt: skip
-    sides = 3, views.data.shape[1] - 4
-    alphas = bench.camera.alpha(bench.depths[0]), bench.camera.alpha(bench.depths[2])
-    caption = parallax(views, sides, alphas)
-    ways = [word.rstrip(",.") for word in caption.split() if word.startswith(("right", "left"))]
-    numbers = [float(word) for word in caption.split() if word[0].isdigit()]
-    for columns, way, number in zip((slice(0, 27), slice(44, 71)), ways, numbers, strict=True):
-        at = []
-        for u in sides:
-            light = lg.sub_aperture(views, views.data.shape[0] // 2, u)[20:50, columns]
-            light = light - np.median(light[:3])
-            at.append(float((light.sum(0) * np.arange(light.shape[1])).sum() / light.sum()))
-        move = (at[1] - at[0]) * (1 if way == "right" else -1)
-        assert 0.6 * number < move < 1.05 * number

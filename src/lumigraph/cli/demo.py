@@ -9,10 +9,10 @@ from lumigraph.errors import FormatError
 
 
 def demo(*, output: Output = Path("demo"), common: Common = COMMON) -> Result:
-    """Run the whole path on two small cameras and write a report.
+    """Refocus a still life, render a focused plenoptic camera and find a microscope's volume.
 
-    Simulates raw and white images, calibrates, decodes or renders, refocuses, and writes
-    report.html, which begins with a living picture, beside the files. Takes about a minute.
+    Writes report.html, which begins with a picture to click into focus, beside the files:
+    raw images, views, pictures, depth, a volume. Takes about half a minute.
 
     Example: `lumigraph demo -o demo`
 

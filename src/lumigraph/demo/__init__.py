@@ -1,7 +1,7 @@
-"""The demonstration: two cameras, a scene with three depths, and everything that lumigraph does with them.
+"""Demonstration: a still life, a focused plenoptic camera and a microscope.
 
-- `showcase`: `run`, which simulates, calibrates, decodes or renders, refocuses and writes a report
-- `plenoptic.toml`, `focused_plenoptic.toml`: the two bundled cameras
+- `showcase`: `run`, which simulates, calibrates, renders, refocuses, measures depth and writes a report
+- `helix`: a microscope's exposure of a double helix, and the volume found in it
 """
 
 from lumigraph.demo.showcase import run

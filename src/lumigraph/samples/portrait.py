@@ -54,7 +54,7 @@ class PortraitSample:
     lobe: float
 
 
-def portrait(camera: Plenoptic, *, progress: Progress = silent) -> PortraitSample:
+def portrait(camera: Plenoptic, *, colour: bool = False, progress: Progress = silent) -> PortraitSample:
     r"""Raw and white image of the scene that `scene` paints, before a plenoptic camera, in some seconds.
 
     Rays go from the sensor through each lenslet, as a thin lens, and the main lens to the layers of the
@@ -72,6 +72,9 @@ def portrait(camera: Plenoptic, *, progress: Progress = silent) -> PortraitSampl
     ----------
     camera
         1.0 or 2.0; its sensor adds no noise.
+    colour
+        True for a raw image (y, x, 3) of the colours, as a sensor of three chips records it; else of their
+        luminance (y, x).
     progress
         Called as ``progress(fraction)``.
 
@@ -97,18 +100,18 @@ def portrait(camera: Plenoptic, *, progress: Progress = silent) -> PortraitSampl
     step = max(1, math.floor(lobe / _PER_LOBE))
     rays, depth = _Rays.of(camera), _depth(camera)
     places = [step * np.arange(-(-n // step)) + (step - 1) / 2 for n in shape]
-    layers = [_Painted.of(layer, camera, rays, depth) for layer in LAYERS]
-    light, white = np.zeros((2, len(places[0]), len(places[1])), np.float32)
+    layers = [_Painted.of(layer, camera, rays, depth, colour) for layer in LAYERS]
+    white = np.zeros((len(places[0]), len(places[1]), 1), np.float32)
+    light = np.zeros((*white.shape[:2], layers[0].light.shape[2]), np.float32)
     rows = max(1, _BAND // light.shape[1])
     for top in range(0, len(light), rows):
         part = slice(top, top + rows)
         for *places_of_rays, lit in rays.through(places[0][part, None], places[1]):
-            light[part] += _composed(layers, *places_of_rays) * lit
-            white[part] += lit
+            light[part] += _composed(layers, *places_of_rays) * lit[..., None]
+            white[part] += lit[..., None]
         progress(min(1.0, (top + rows) / len(light)))
     raw, even = (
-        RawImage(_upsampled(_diffracted(found / _RAYS**2, lobe / step), places, shape), pixel)
-        for found in (light, white)
+        RawImage(_recorded(found / _RAYS**2, lobe / step, places, shape), pixel) for found in (light, white)
     )
     distance, part = camera.object_distance, depth / camera.object_distance
     depths = -distance * part / (1 + part), distance * part / (1 - part)
@@ -204,8 +207,10 @@ class _Painted:
 
     Parameters
     ----------
-    light, cover
-        (rows, columns), from -1/2 - margin heights on; light is 0 where nothing covers.
+    light
+        (rows, columns, 1 or 3), from -1/2 - margin heights on; 0 where nothing covers.
+    cover
+        (rows, columns).
     parallax, slant
         As those of `still_life.Layer`, for the diameter of the main lens.
     """
@@ -216,7 +221,9 @@ class _Painted:
     slant: float
 
     @classmethod
-    def of(cls, layer: Layer, camera: Plenoptic, rays: _Rays, depth: float) -> "_Painted":
+    def of(
+        cls, layer: Layer, camera: Plenoptic, rays: _Rays, depth: float, colour: bool
+    ) -> "_Painted":  # fmt: skip
         half = (0.5 + _MARGIN, 0.5 * _aspect(camera) + _MARGIN)
         y, x = (
             (np.arange(round(2 * h * _FINE), dtype=np.float32) + 0.5) / _FINE - np.float32(h) for h in half
@@ -224,21 +231,23 @@ class _Painted:
         canvas = layer.seen(y[:, None], x, (0.0, 0.0))
         cover = canvas.cover.astype(np.float32)
         cutoff = camera.pupil_diameter / (camera.wavelength * camera.object_distance) * rays.height / _FINE
-        light, cover = (_low_passed(part, cutoff) for part in (canvas.colour @ _LUMINANCE * cover, cover))
+        shown = canvas.colour if colour else (canvas.colour @ _LUMINANCE)[..., None]
+        channels = np.moveaxis(shown * cover[..., None], -1, 0)
+        light = np.stack([_low_passed(channel, cutoff) for channel in channels], -1)
         most = max(abs(one.parallax) for one in LAYERS)
         # A point at a depth dz moves by D dz/(z1 + dz) in the focused plane; the nearer layers have dz < 0.
         scale = -camera.pupil_diameter / camera.object_distance * depth / most / rays.height
-        return cls(light, cover, scale * layer.parallax, scale * layer.slant)
+        return cls(light, _low_passed(cover, cutoff), scale * layer.parallax, scale * layer.slant)
 
     def seen(self, y: np.ndarray, x: np.ndarray, v: np.ndarray, u: np.ndarray) -> tuple[Any, Any]:
         """Light and cover where rays meet the layer."""
         own = (y - self.parallax * v) / (1 + self.slant * v)
         columns = x - (self.parallax + self.slant * own) * u
-        shape = self.light.shape
+        shape = self.cover.shape
         rows = np.clip(np.rint(own * _FINE + shape[0] / 2 - 0.5), 0, shape[0] - 1).astype(np.intp)
         columns = np.clip(np.rint(columns * _FINE + shape[1] / 2 - 0.5), 0, shape[1] - 1).astype(np.intp)
         flat = rows * shape[1] + columns
-        return self.light.ravel()[flat], self.cover.ravel()[flat]
+        return self.light.reshape(-1, self.light.shape[2])[flat], self.cover.ravel()[flat][..., None]
 
 
 def _depth(camera: Plenoptic) -> float:
@@ -261,7 +270,7 @@ def _aspect(camera: Plenoptic) -> float:
 
 def _composed(layers: list[_Painted], y: Any, x: Any, v: Any, u: Any) -> np.ndarray:
     """Colours along rays, layers composed from back to front."""
-    total = np.zeros(y.shape, np.float32)
+    total = np.zeros((*y.shape, layers[0].light.shape[2]), np.float32)
     for layer in layers:
         light, cover = layer.seen(y, x, v, u)
         total = total * (1 - cover) + light
@@ -276,6 +285,12 @@ def _low_passed(picture: np.ndarray, cutoff: float) -> np.ndarray:
     spectrum: Any = fft.rfft2(picture)
     found: Any = fft.irfft2(spectrum * transfer.astype(np.float32), picture.shape)
     return found
+
+
+def _recorded(light: np.ndarray, lobe: float, places: list[np.ndarray], shape: tuple[int, int]) -> np.ndarray:
+    """Pixels (y, x[, 3]) of light (rows, columns, 1 or 3) that diffraction blurs."""
+    channels = [_upsampled(_diffracted(part, lobe), places, shape) for part in np.moveaxis(light, -1, 0)]
+    return channels[0] if len(channels) == 1 else np.stack(channels, -1)
 
 
 def _diffracted(light: np.ndarray, lobe: float) -> np.ndarray:

@@ -133,6 +133,8 @@ export class Controls {
     if (state.mode !== "depth") this.histogram.draw(model, state, this.app.main.image);
     for (const id of ["ev", "black", "gamma"]) by(id).value = state[id];
     tell("ev-out", `${state.ev > 0 ? "+" : ""}${state.ev.toFixed(2)} EV`);
+    by("pick-grey").hidden = channels !== 3;
+    for (const what of ["grey", "exposure"]) by(`pick-${what}`).setAttribute("aria-pressed", String(this.app.picking === what));
     tell("black-out", `${Math.round(100 * state.black)} %`);
     tell("gamma-out", state.gamma.toFixed(2));
     for (const id of ["shape", "projection", "channel", "drag"]) by(id).value = state[id];
@@ -191,7 +193,7 @@ export class Controls {
     const colours = Array.from({ length: 17 }, (_, k) => { const i = 4 * Math.round((k * 255) / 16); return `rgb(${map[i]} ${map[i + 1]} ${map[i + 2]})`; });
     by("legend-bar").style.background = `linear-gradient(to right, ${colours.join(", ")})`;
     const { metres, shift } = model.about.depth, metric = !metres && !shift && model.views?.metric && model.about.depth.label.startsWith("Focus"), place = (x) => lengthText(model.views.separation / x);
-    const shown = (x) => (metric ? place(x) : depthText(model.about.depth, x));
+    const shown = (x) => (metric ? place(x) : depthText(model.about.depth, x, 3, range[1] - range[0]));
     by("legend-low").textContent = range ? shown(range[0]) : "";
     by("legend-high").textContent = range ? shown(range[1]) : "";
     by("legend-label").textContent = metres ? "from focus" : shift ? "Disparity" : metric ? "image distance" : model.about.depth.label;

@@ -158,6 +158,7 @@ class Device {
       gl.uniform3fv(at.mixing, image.channels === 1 ? [1, 0, 0] : weights ?? [0, 0, 0]);
       gl.uniform1f(at.gain, tone.gain);
       gl.uniform1f(at.lift, tone.lift);
+      gl.uniform3fv(at.balance, tone.balance ?? [1, 1, 1]);
       gl.uniform1f(at.power, tone.power);
     });
     this.everywhere();

@@ -5,6 +5,7 @@ import { FilmDialog, filmsOf } from "./film.js";
 import { listenToKeys } from "./keys.js";
 import { Model } from "./models.js";
 import { Pane } from "./pane.js";
+import { PICKS } from "./picking.js";
 import { Player } from "./play.js";
 import { pictureCanvas, savePicture, saveQuilt } from "./saving.js";
 import { isExported, loadAbout } from "./source.js";
@@ -67,6 +68,13 @@ class App {
     Object.assign(this.state, changes);
     this.touched();
   };
+
+  /** The next click sets the white balance ("grey") or the exposure; null: it focuses again. */
+  pickBy(what) {
+    this.picking = this.picking === what ? null : what;
+    if (this.picking) this.tell(PICKS[what]);
+    this.schedule();
+  }
 
   touched() {
     this.moving = true; // until the next frame, however late it comes
@@ -160,13 +168,15 @@ async function fullScreen(app) {
 function wire(app) {
   const actions = {
     s: () => savePicture(app), v: () => { if (filmsOf(app.main.model, app.state).length) app.film.open(); }, r: () => app.set({ turn: (app.state.turn + 1) % 4 }), 0: () => app.set({ zoom: 1, at: null }), "?": () => document.getElementById("keys").showModal(),
-    f: () => fullScreen(app), "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8),
+    w: () => here("grey"), x: () => here("exposure"), f: () => fullScreen(app), "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8),
   };
   const zoom = (factor) => { const box = app.main.stage.getBoundingClientRect(); app.main.zoomAt([box.width / 2, box.height / 2], factor); };
+  const here = (what) => { const { base, hover } = app.main; if (base) app.main.pick(what, hover ?? app.state.point ?? base.map((n) => (n - 1) / 2)); };
   const on = (id, act) => document.getElementById(id).addEventListener("click", act);
   on("quilt", () => saveQuilt(app)); on("save-film", actions.v); on("turn", actions.r);
   on("save", actions.s); on("fit", actions[0]); on("help", actions["?"]); on("full", actions.f); on("link", () => copyLink(app));
   on("reset", () => { app.state = { ...app.base, mode: app.state.mode, renderer: app.state.renderer }; app.touched(); });
+  on("pick-grey", () => app.pickBy("grey")); on("pick-exposure", () => app.pickBy("exposure"));
   on("pixel", () => zoom(1 / ((app.main.scale[0] / app.main.image.detail / app.main.model.factor) / app.main.ratio)));
   app.player = new Player(app);
   app.film = new FilmDialog(app);

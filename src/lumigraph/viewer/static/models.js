@@ -321,6 +321,11 @@ export class Model {
     return depth && confidence ? ends(depth, confidence).map((x) => depth.offset + depth.scale * x) : null;
   }
 
+  depthSpan() {
+    const range = this.depthRange();
+    return range ? range[1] - range[0] : 0;
+  }
+
   depthAt(y, x) {
     const { depth, confidence } = this.arrays;
     if (!depth || !confidence) return null;

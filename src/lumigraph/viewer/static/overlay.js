@@ -102,12 +102,20 @@ export function metresOf({ metres: [alphas, depths] }, alpha) {
   return alphas.length < 2 || alpha < alphas[0] || alpha > alphas.at(-1) ? null : depths[k - 1] + part * (depths[k] - depths[k - 1]);
 }
 
-/** A depth as its map counts it: in metres where the camera is known, as a shift per view where that is all that has a meaning. */
-export function depthText(about, value, digits = 3) {
+/** Decimals that tell values apart that span `span`, at a hundredth of it; `least` for a wide span or none. */
+export function decimals(span, least) {
+  return span > 0 ? Math.min(9, Math.max(least, 2 - Math.ceil(Math.log10(span)))) : least;
+}
+
+/**
+ * A depth as its map counts it: in metres where the camera is known, as a shift per view where that is all that has a meaning.
+ * `span`, that of the map's values, gives it as many digits as small ranges need.
+ */
+export function depthText(about, value, digits = 3, span = 0) {
   const { unit, metres, shift } = about, depth = metres ? metresOf(about, value) : null;
   if (metres) return depth === null ? "beyond infinity" : signed(depth, lengthText);
-  if (shift) return signed((1 - value) * shift.per, (x) => `${x.toFixed(2)} ${shift.word} per view`);
-  return unit === "m" ? lengthText(value) : `${value.toFixed(digits)} ${unit}`.trim();
+  if (shift) return signed((1 - value) * shift.per, (x) => `${x.toFixed(decimals(span * Math.abs(shift.per), 2))} ${shift.word} per view`);
+  return unit === "m" ? lengthText(value) : `${value.toFixed(decimals(span, digits))} ${unit}`.trim();
 }
 
 /** A number with its sign in front. */
@@ -123,8 +131,8 @@ function errorText(about, value, error) {
 }
 
 /** What a place of a depth map says: value, the error to expect, confidence. */
-export function depthTexts(about, { value, error, confidence }) {
+export function depthTexts(about, { value, error, confidence }, span = 0) {
   const label = about.metres ? "depth" : about.shift ? "disparity" : about.label === "Focus α′" ? "α′" : about.label.toLowerCase();
   const spread = error === null ? "" : ` ± ${errorText(about, value, error)}`;
-  return [`${label} ${depthText(about, value, 4)}${spread}`, `confidence ${confidence.toFixed(2)}`];
+  return [`${label} ${depthText(about, value, 4, span)}${spread}`, `confidence ${confidence.toFixed(2)}`];
 }

@@ -9,6 +9,7 @@ import { drawMeasures, regionText, samplesOf } from "./measures.js";
 import { clearOverlay, depthTexts, lengthText, drawCross, drawLattice, drawMark, drawScaleBar } from "./overlay.js";
 import { drawAxes } from "./rays.js";
 import { drawSections, panelAt, samplesAt } from "./sections.js";
+import { picked } from "./picking.js";
 import { toneOf } from "./tone.js";
 import { turned } from "./turning.js";
 
@@ -81,6 +82,7 @@ export class Pane {
     }
     const image = this.model.image(state, this.device, settled);
     if (!image) return this.blank();
+    if (!this.device && !image.early) return this.blank(); // a written page shows only its poster before it has a device
     if (this.device && !this.device.fits(image)) return this.app.tell(`${image.nx} × ${image.ny} pixels are too many for this graphics processor.`, true);
     const view = { ...this.layout(image), smooth: state.smooth && !image.sharp && this.scale[0] / image.detail < 24, ground: this.app.ground };
     this.tone = this.toneFor(state, image);
@@ -198,7 +200,7 @@ export class Pane {
     if (row < 0 || column < 0 || row >= image.ny || column >= image.nx || parts[0] === "") { this.readout.textContent = ""; return; }
     if (this.app.state.mode === "depth") {
       const found = this.model.depthAt(y, x);
-      if (found) parts.push(...depthTexts(this.model.about.depth, found));
+      if (found) parts.push(...depthTexts(this.model.about.depth, found, this.model.depthSpan()));
     } else {
       const start = (row * image.nx + column) * image.channels;
       const numbers = image.texture ? this.device.sample(image, column, row) : image.numbers.subarray(start, start + image.channels);
@@ -249,7 +251,16 @@ export class Pane {
     this.marked = this.marked ? null : place;
   }
 
+  /** Makes a place grey, or as bright as middle grey. */
+  pick(what, place) {
+    const found = picked(this, what, place);
+    if (found) this.app.set(found);
+    else this.app.tell("There is too little light, or no colour, to set that by.");
+  }
+
   click(place) {
+    const { picking } = this.app;
+    if (picking) { this.app.pickBy(null); this.pick(picking, place); return; }
     if (this.app.state.drag !== "move") { this.mark(place); return; }
     if (this.image?.sections) { this.cut(place); return; }
     if (this.app.state.sharp) { this.app.tell("Everything is in focus. Uncheck “All in focus” to choose."); return; }

@@ -129,7 +129,7 @@ uniform int layer;
 uniform vec2 origin, scale; // of the picture's first sample on the target [px], and target px per sample
 uniform float height;      // of the target, to turn it over; 0 leaves it
 uniform bool smooth_, coloured;
-uniform vec3 ground, mixing;
+uniform vec3 ground, mixing, balance;
 uniform float gain, lift, power;
 out vec4 colour;
 
@@ -161,9 +161,9 @@ void main() {
   }
   vec3 x = value(place);
   if (coloured) {
-    colour = vec4(pow(clamp(gain * x + lift, 0.0, 1.0), vec3(power)), 1.0);
+    colour = vec4(pow(clamp(balance * (gain * x + lift), 0.0, 1.0), vec3(power)), 1.0);
   } else {
-    float level = pow(clamp(gain * dot(x, mixing) + lift, 0.0, 1.0), power);
+    float level = pow(clamp(dot(balance * (gain * x + lift), mixing), 0.0, 1.0), power);
     colour = vec4(texelFetch(colours, ivec2(int(floor(level * 255.0 + 0.5)), 0), 0).rgb, 1.0);
   }
 }`;

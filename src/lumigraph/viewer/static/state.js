@@ -14,7 +14,7 @@ const several = (count) => (low, high) => (text) => {
   const values = text.split(",").map((word) => number(low, high)(word));
   return values.length === count && values.every((value) => value !== undefined) ? values : undefined;
 };
-const pair = several(2), four = several(4);
+const pair = several(2), three = several(3), four = several(4);
 
 const plain = (digits) => (value) => String(Number(value.toFixed(digits)));
 const switched = (value) => (value ? "on" : "off");
@@ -33,6 +33,7 @@ const FIELDS = {
   cross: [null, pair(0, 1e6), both(0)],
   trust: [0.1, number(0, 1), plain(2)],
   ev: [0, number(-12, 12), plain(2)],
+  balance: [[1, 1, 1], three(1e-3, 1000), both(3)],
   black: [0, number(-2, 0.98), plain(3)],
   gamma: [1, number(0.2, 5), plain(2)],
   map: ["grey", choice(...MAPS), String],

@@ -5,6 +5,8 @@ import { mapColours } from "./colours.js";
 export const CHANNELS = ["colour", "mono", "red", "green", "blue"];
 export const LUMINANCE = [0.2126, 0.7152, 0.0722]; // Rec. 709
 
+export const EVEN = [1, 1, 1]; // gains of red, green and blue
+
 const mapCache = new Map();
 
 export function cachedMap(name) {
@@ -17,7 +19,7 @@ export function toneOf(state, image) {
   const white = image.white || 1, gain = (2 ** state.ev) / (white * (1 - state.black));
   return {
     gain: gain * image.scale, lift: gain * (image.offset - state.black * white), power: 1 / state.gamma,
-    map: state.map, channel: image.channels === 3 ? state.channel : "mono",
+    map: state.map, channel: image.channels === 3 ? state.channel : "mono", balance: image.channels === 3 ? state.balance : EVEN,
   };
 }
 
@@ -31,20 +33,19 @@ export function channelWeights(channel) {
 /** Bytes r, g, b, a of numbers (n pixels, interleaved channels), as the shader would show them. */
 export function toneBytes(numbers, channels, tone) {
   const n = numbers.length / channels, out = new Uint8ClampedArray(4 * n);
-  const { gain, lift, power } = tone, map = cachedMap(tone.map), weights = channelWeights(tone.channel);
-  const level = (x) => Math.min(1, Math.max(0, gain * x + lift)) ** power * 255;
+  const { gain, lift, power, balance = EVEN } = tone, map = cachedMap(tone.map), weights = channelWeights(tone.channel);
+  const byte = (x) => Math.min(1, Math.max(0, x)) ** power * 255, level = (x) => byte(gain * x + lift);
   const table = numbers.BYTES_PER_ELEMENT <= 2 && n > 65536 && !(numbers instanceof Float32Array)
     ? Float32Array.from({ length: numbers.BYTES_PER_ELEMENT === 1 ? 256 : 65536 }, (_, x) => level(x)) : null;
-  const shown = table ? (x) => table[x] : level;
+  const shown = table ? (x) => table[x] : level, even = balance.every((b) => b === 1);
   for (let i = 0, o = 0; i < n; i++, o += 4) {
     out[o + 3] = 255;
     if (channels === 3 && !weights) {
-      for (let c = 0; c < 3; c++) out[o + c] = shown(numbers[3 * i + c]);
+      for (let c = 0; c < 3; c++) out[o + c] = even ? shown(numbers[3 * i + c]) : byte(balance[c] * (gain * numbers[3 * i + c] + lift));
       continue;
     }
-    const x = channels === 1 ? numbers[i]
-      : weights[0] * numbers[3 * i] + weights[1] * numbers[3 * i + 1] + weights[2] * numbers[3 * i + 2];
-    const k = 4 * Math.round(channels === 1 ? shown(x) : level(x));
+    const light = channels === 1 ? 0 : weights.reduce((sum, w, c) => sum + w * balance[c] * (gain * numbers[3 * i + c] + lift), 0);
+    const k = 4 * Math.round(channels === 1 ? shown(numbers[i]) : byte(light));
     out[o] = map[k]; out[o + 1] = map[k + 1]; out[o + 2] = map[k + 2];
   }
   return out;
