@@ -4,7 +4,8 @@
 
 Numbers are relative rms errors of raw images, the worst of each place, over the accuracy asked for: up to 1
 the promise is kept in the middle and outside the array, up to 2 within a lenslet of its border. Rows are kept
-in a file as they come; a run that was stopped goes on. `--write` puts the table into docs/validation/operator.md.
+in a file as they come; a run that was stopped goes on. `--write` puts the table into
+docs/validation/operator.md.
 """
 
 import argparse
