@@ -26,7 +26,7 @@ _PICTURES = {
 @Parameter(name="*", group=section("Raw image"))
 @dataclass(frozen=True)
 class GivenOptions:
-    """What is known of the raw image.
+    """Files and camera that belong to the raw image.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def process(
 
 
 def _expected(given: GivenOptions) -> str:
-    """What it will take, before it begins."""
+    """Estimated time and memory, before it begins."""
     if given.camera is None:
         return "process: for a raw image of some megapixels half a minute and 1 GB; progress follows"
     return "process: half a minute and 1 GB, of a microscope up to 2 minutes and 3 GB; progress follows"

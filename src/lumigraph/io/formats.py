@@ -178,7 +178,7 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     axes: str | None = None,
     max_pixels: int = MAX_PIXELS,
 ) -> Noun:
-    """Content of a file or a folder of views; its ending says which format (table: `docs/reference/formats.md`).
+    """Content of a file or a folder of views; the ending tells the format; see `docs/reference/formats.md`.
 
     Sizes are read from the headers and checked, against the file's own size too, before anything is
     decoded.

@@ -123,7 +123,7 @@ def left_in(raw: RawImage, beside: ReferenceImages, pitch: float) -> str | None:
 
 
 def floor_under(raw: RawImage, beside: ReferenceImages, pitch: float) -> str | None:
-    """What to say of a floor under the raw image where there is neither a white image nor a dark one.
+    """Note on a floor under the raw image, where there is neither a white nor a dark image.
 
     Gaps between micro-images are dark: where the darkest pixels of all tiles are alike, however bright the
     brightest ones are, they show the floor.

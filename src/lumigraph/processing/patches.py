@@ -76,7 +76,7 @@ class FromPatches:
         return np.unique(np.copysign(np.clip(np.abs(sizes), 1.0, most), (low + high) / 2))
 
     def steps(self, source: str) -> list[Step]:
-        """What is written."""
+        """Files that are written."""
 
         def write_depth(folder: Path, progress: Progress) -> None:
             io.save(self.map, folder / "depth.tiff")

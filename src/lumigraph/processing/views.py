@@ -84,7 +84,7 @@ class FromViews:
         return np.linspace(max(low - spare, min(least, low)), min(high + spare, max(most, high)), FRAMES)
 
     def steps(self, source: str, *, decoded: bool) -> list[Step]:
-        """What is written; `decoded`: the views come from a raw image."""
+        """Files that are written; `decoded`: the views come from a raw image."""
 
         def write_views(folder: Path, progress: Progress) -> None:
             io.save(self.views, folder / VIEWS)

@@ -78,7 +78,7 @@ class FromVolume:
         )  # fmt: skip
 
     def steps(self, source: str) -> list[Step]:
-        """What is written."""
+        """Files that are written."""
 
         def write_volume(folder: Path, progress: Progress) -> None:
             self._progress, self._standing = progress, None

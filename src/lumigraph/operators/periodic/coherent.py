@@ -132,7 +132,7 @@ class _Stop:
         return f"{count} modes, {memory.told(self.size(count))}" if count > 1 else ""
 
     def lights(self, modes: np.ndarray, progress: Progress) -> list[np.ndarray]:
-        """Of each of several planes (modes, y, x), where they fit in memory."""
+        """Light of each of several planes (modes, y, x), where they fit in memory."""
         memory.require(
             self.size(len(modes)), f"light of {len(modes)} modes in the stop",
             "Use fewer modes, a smaller object or a smaller stop.", SamplingError,
