@@ -1,32 +1,18 @@
-"""MATLAB files: version 7.3, which is HDF5, and version 5 (SciPy reads its numbers); read, not written.
+"""MATLAB files: version 7.3, which is HDF5, and version 5; read, not written.
 
 The variable ``LF`` of the Light Field Toolbox is (row, column, y, x, c), its last colour the weight of a
 sample.
 """
 
-from collections.abc import Iterator
 from math import prod
 from pathlib import Path
-
-import numpy as np
-import scipy.io
 
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
-from lumigraph.io import arrays, hdf5, source
-
-_TEXT, _COMPRESSED, _MOST = 128, 15, 1000
-"""Bytes of text in front, the type of a packed variable, variables that are looked at."""
-
-_SIZES = {
-    "double": 8, "single": 4, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4,
-    "int64": 8, "uint64": 8, "logical": 1,
-}  # fmt: skip
-_SPARE = 1 << 16  # bytes of headers in a packed variable
-Shapes = dict[str, tuple[tuple[int, ...], str]]
+from lumigraph.io import arrays, hdf5, mat5, source
 
 
 def load(
@@ -53,19 +39,9 @@ def load(
     if _is_hdf5(path := source.regular_file(path)):
         return hdf5.load(path, what=what, axes=axes, max_pixels=max_pixels)
     with source.decoding(path, "a MATLAB file"):
-        found = _variables(path)
-        name = _chosen(path, found, what)
-        shape, kind = found[name]
-        source.check_size(path, shape, max_pixels)
-        size = path.stat().st_size
-        # Whole numbers are stored in as few bytes as hold them: one at least for each.
-        source.check_stored(path, prod(shape), size)
-        source.check_held(path, prod(shape) * _SIZES[kind], size, max_pixels)
-        _check_packed(path, max(prod(shape) * 8 + _SPARE, 64 << 20))
-        data = scipy.io.loadmat(path, variable_names=[name], appendmat=False)[name]
-        if not isinstance(data, np.ndarray) or data.dtype.kind not in "iufb" or data.shape != shape:
-            raise FormatError(f"{path}: {name} is not an array of real numbers of {shape}.")
-        data = data.astype(data.dtype.newbyteorder("="), copy=False)
+        variable = _chosen(path, mat5.variables(path), what)
+        name, shape = variable.name, variable.shape
+        data = mat5.values(path, variable, max_pixels=max_pixels)
         letters = arrays.arrangement(f"{name} of {path}", shape, axes=axes, reverse=False, weighted=True)
         return arrays.as_noun(data, letters, {}, weighted=name == "LF")
 
@@ -77,11 +53,12 @@ def contents(path: Path) -> list[tuple[str, str, str]]:
     with source.decoding(path, "a MATLAB file"):
         return [
             (
-                name,
-                arrays.noun_of(arrays.arrangement("", shape, reverse=False, weighted=True)),
-                f"{_times(shape)}, {kind}",
+                each.name,
+                arrays.noun_of(arrays.arrangement("", each.shape, reverse=False, weighted=True)),
+                f"{_times(each.shape)}, {each.kind}",
             )
-            for name, (shape, kind) in _variables(path).items()
+            for each in mat5.variables(path)
+            if _is_read(each)
         ]
 
 
@@ -94,61 +71,37 @@ def _is_hdf5(path: Path) -> bool:
     return False
 
 
-def _variables(path: Path) -> Shapes:
-    """Shape and class of each array of numbers with 2 to 5 axes."""
-    _check_packed(path, _largest(path))
-    listed = scipy.io.whosmat(path, appendmat=False)
-    return {
-        name: (tuple(int(n) for n in shape), kind)
-        for name, shape, kind in listed[:_MOST]
-        if kind in _SIZES and 2 <= len(shape) <= 5 and prod(shape) > 1
-    }
+def _is_read(variable: mat5.Variable) -> bool:
+    shape = variable.shape
+    return variable.dtype is not None and 2 <= len(shape) <= 5 and prod(shape) > 1
 
 
-def _chosen(path: Path, found: Shapes, what: str | None) -> str:
-    if what is not None and what not in found:
-        near = ", ".join(list(found)[:8]) or "nothing that is read"
-        raise FormatError(f"{path} has no array of numbers {what!r}. It holds {near}.")
-    if what is not None or "LF" in found:
-        return what or "LF"
-    if len(found) == 1:
-        return next(iter(found))
-    if not found:
-        raise FormatError(f"{path} holds no array of 2 to 5 axes of real numbers. Check the file.")
-    raise FormatError(f"{path} holds {', '.join(list(found)[:8])}. Choose one by what=.")
+def _chosen(path: Path, found: list[mat5.Variable], what: str | None) -> mat5.Variable:
+    """The variable that is asked for, ``LF``, or the only one that can be read; others are named."""
+    read = [each for each in found if _is_read(each)]
+    names = ", ".join(each.name for each in read[:8])
+    wanted = "LF" if what is None and any(each.name == "LF" for each in found) else what
+    fits = [each for each in found if each.name == wanted] if wanted is not None else read
+    if wanted is not None and not any(map(_is_read, fits)):
+        # Another one instead of an LF that cannot be read would be the wrong one without a word.
+        about = f": it is {_about(fits[0])}" if fits else ""
+        raise FormatError(
+            f"{path} has no array of numbers {wanted!r}{about}. It holds {names or 'nothing that is read'}."
+        )
+    if len(fits) == 1:
+        return fits[0]
+    if len({each.name for each in fits}) == 1:
+        name = fits[0].name
+        raise FormatError(f"{path} is damaged: {len(fits)} variables are called {name!r}. Save it again.")
+    if not fits:
+        others = ", ".join(f"{each.name} ({_about(each)})" for each in found[:8])
+        but = f", only {others}" if others else ""
+        raise FormatError(f"{path} holds no array of 2 to 5 axes of real numbers{but}. Check the file.")
+    raise FormatError(f"{path} holds {names}. Choose one by what=.")
 
 
-def _largest(path: Path) -> int:
-    return source.MAX_PIXELS * 8 + path.stat().st_size
-
-
-def _check_packed(path: Path, most: int) -> None:
-    """Refuse packed variables that become more than that."""
-    for start, size in _packed(path):
-        if size * source.MOST_INFLATED > most:
-            with path.open("rb") as file:
-                file.seek(start)
-                source.check_inflated(path, file.read(size), most)
-
-
-def _packed(path: Path) -> Iterator[tuple[int, int]]:
-    """Start and size of each packed variable in the file [bytes]."""
-    size, at = path.stat().st_size, _TEXT
-    with path.open("rb") as file:
-        order = "little" if file.read(_TEXT)[126:128] == b"IM" else "big"
-        for _ in range(_MOST):
-            file.seek(at)
-            tag = file.read(8)
-            if len(tag) < 8:
-                return
-            kind, count = (int.from_bytes(tag[k : k + 4], order) for k in (0, 4))
-            if at + 8 + count > size:
-                raise FormatError(
-                    f"{path} is cut short: a variable ends behind its {size} bytes. Copy it again."
-                )
-            if kind == _COMPRESSED:
-                yield at + 8, count
-            at += 8 + count
+def _about(variable: mat5.Variable) -> str:
+    return f"{_times(variable.shape)} {variable.kind}".lstrip()
 
 
 def _times(shape: tuple[int, ...]) -> str:
