@@ -199,7 +199,6 @@ def _of_lenslets(
     """Plan for a camera 1.0 or 2.0."""
     (kind, guesses), ready = known, given.prepared(calibration)
     place = ready.calibration or calibration
-    camera: Any = given.camera
     if kind == "plenoptic 1.0":
         views = FromViews(ready)
         made, todo = views, views.steps(given.fingerprint, decoded=True)
@@ -208,7 +207,7 @@ def _of_lenslets(
         made, todo = patches, patches.steps(given.fingerprint)
 
     def exhibit() -> Exhibit:
-        origin = Origin(given.maker, camera=camera)
+        origin = Origin(given.maker, camera=given.camera)
         if not isinstance(made, FromPatches):
             return replace(of_raw(given.name, ready, place, None, origin), depth=made.depth)
         page = of_raw(given.name, ready, place, sum(made.ends) / 2, origin)
