@@ -89,8 +89,8 @@ def test_results_of_a_function_are_kept_by_its_arguments_within_the_shared_budge
     ("module", "name", "arguments"),
     [
         ("deconvolution.filters", "lanczos", (307, 41.5)),
-        ("operators.microscope_patterns", "parts", (411,)),
-        ("operators.microscope_patterns", "all_patterns", (61,)),  # sizes that no other test has used
+        ("operators.microscope.cell", "parts", (411,)),
+        ("operators.microscope.patterns", "all_patterns", (61,)),  # sizes that no other test has used
     ],
 )
 def test_tables_that_grow_with_the_image_count_in_the_budget(module, name, arguments):

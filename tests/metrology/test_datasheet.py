@@ -13,7 +13,9 @@ from lumigraph.calibration import calibrate
 from lumigraph.cli import main
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.raw import RawImage
+from lumigraph.core.result import Quantity
 from lumigraph.errors import CalibrationError, FormatError, GeometryError
+from lumigraph.instruments import load_camera
 from lumigraph.metrology.boards.places import places, residual
 from lumigraph.metrology.datasheet import steady
 from lumigraph.metrology.datasheet.charts import check_camera
@@ -155,7 +157,7 @@ def test_snr_is_that_of_the_electrons(drawn):
     ],
 )
 def test_values_have_the_digits_of_their_intervals(value, unit, interval, shown):
-    entry = lg.metrology.SheetEntry("", lg.metrology.sheet.Quantity("a", value, unit, interval), "")
+    entry = lg.metrology.SheetEntry("", Quantity("a", value, unit, interval), "")
     assert entry.text == shown
 
 
@@ -356,6 +358,6 @@ def test_only_plenoptic_cameras_have_a_sheet():
     "name", ["thesis-plenoptic-1", "thesis-plenoptic-2-m030", "galilean", "multi-focus-hex"]
 )
 def test_charts_stand_on_either_side_of_the_focus(name):
-    depths = usual_depths(check_camera(lg.metrology.charts.load_camera(name)))
+    depths = usual_depths(check_camera(load_camera(name)))
     assert min(depths) < 0 < max(depths)
     assert 0.0 in depths

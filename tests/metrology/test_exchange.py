@@ -9,7 +9,7 @@ import pytest
 import lumigraph as lg
 from data_folder import real
 from lumigraph.errors import FormatError
-from lumigraph.metrology.boards import compote
+from lumigraph.metrology.boards import compote, geometry
 
 RNG = np.random.default_rng(18)
 SHAPE = (600, 801)
@@ -229,7 +229,7 @@ def test_distortion_of_lftoolbox_turns_rays_to_where_points_are(tmp_path):
     true = from_middle * (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3) + middle
     for sign, most in ((1, 1e-5), (-1, np.inf)):  # the distortion's middle is held to first order
         tangential = sign * np.array(camera.tangential)
-        back = lg.metrology.geometry.distorted(true[:, ::-1], np.array(camera.radial), tangential)
+        back = geometry.distorted(true[:, ::-1], np.array(camera.radial), tangential)
         assert np.abs(back[:, ::-1] - seen).max() < most
     assert np.abs(back[:, ::-1] - seen).max() > 3e-5
     assert np.abs(true - seen).max() > 2e-5

@@ -19,7 +19,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
-from lumigraph.metrology.boards import finding
+from lumigraph.metrology.boards import chessboard, finding, geometry
 from lumigraph.preparation import prepare
 from lumigraph.scene import targets
 from metrology import drawn
@@ -29,7 +29,7 @@ pytest.importorskip("cv2", reason="OpenCV finds the board")
 
 def off(found, camera, where):
     """From the truth (n, 2) [px], with the board counted from either end."""
-    points = metrology.geometry.moved(drawn.BOARD.points(), where)
+    points = geometry.moved(drawn.BOARD.points(), where)
     ways = [
         found.place - camera.project(each[found.corner], found.center, found.kind)
         for each in (points, points[::-1])
@@ -65,11 +65,11 @@ def test_a_whole_chessboard_that_opencv_misses_or_gets_wrong_is_found(misses, mo
     monkeypatch.setattr(
         cv2, "findChessboardCornersSB", lambda *_, **__: (False, None) if misses else (True, answer)
     )
-    found = metrology.chessboard.find(picture, board, "it")
+    found = chessboard.find(picture, board, "it")
     assert min(np.abs(found - one).max() for one in (true, true[::-1])) < 0.1
     message = "it does not show a whole chessboard of 4 x 3" if misses else "no flat board in any order"
     with pytest.raises(CalibrationError, match=message):
-        metrology.chessboard.find(picture[:80], board, "it")
+        chessboard.find(picture[:80], board, "it")
 
 
 def test_the_rim_of_a_micro_image_pulls_at_corners_beyond_the_clear_radius_alone() -> None:
@@ -105,7 +105,7 @@ def test_saddles_between_a_board_and_a_dark_rim_are_none_of_its_corners(turn, aw
     picture = drawn.squares(at, np.full(len(at), 0.2), board).reshape(47, fine, 47, fine).mean((1, 3))
     picture[:3] = picture[-3:] = picture[:, :3] = picture[:, -3:] = 0
     assert len(find_chart(picture)) == saddles
-    found, _ = metrology.chessboard.whole(picture, board)
+    found, _ = chessboard.whole(picture, board)
     flat = board.points()[:, 1:] - board.middle[1:] - (0, away)
     true = flat @ np.array([[c, -s], [s, c]]) + 23
     assert np.asarray(KDTree(true).query(found)[0]).max() < 0.2
@@ -114,7 +114,7 @@ def test_saddles_between_a_board_and_a_dark_rim_are_none_of_its_corners(turn, aw
 
 def test_the_board_tells_the_sign_of_the_patches(monkeypatch) -> None:
     """Its squares repeat: patches of either sign may explain them about as well."""
-    known = metrology.finding.of_signs
+    known = finding.of_signs
 
     def wrong_first(raw, calibration):
         (right,) = known(raw, calibration)
@@ -124,7 +124,7 @@ def test_the_board_tells_the_sign_of_the_patches(monkeypatch) -> None:
     camera, where = drawn.camera(1.0, 1), drawn.pose((0.05, 0.3, -0.25))
     ready = prepare(drawn.raw(camera, where, 1), drawn.calibration(1), white=drawn.white(1))
     sure = metrology.find_corners([ready], drawn.BOARD)
-    monkeypatch.setattr(metrology.finding, "of_signs", wrong_first)
+    monkeypatch.setattr(finding, "of_signs", wrong_first)
     assert np.array_equal(metrology.find_corners([ready], drawn.BOARD).place, sure.place)
 
 

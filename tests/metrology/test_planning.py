@@ -11,6 +11,7 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.errors import CalibrationError
 from lumigraph.metrology.boards import geometry, planning
+from lumigraph.metrology.boards.noise import Noise
 from metrology import drawn, drawn_views, scenes
 
 NONE = np.zeros((0, 2))
@@ -23,7 +24,7 @@ def plan():
 
 
 def before(camera):
-    noise = metrology.noise.Noise(np.array([0.1]), 0.05)
+    noise = Noise(np.array([0.1]), 0.05)
     return planning._Before(camera, drawn.calibration(), drawn.BOARD, noise, in_views=False)
 
 
@@ -147,7 +148,7 @@ def test_a_plan_for_views_says_what_boards_in_views_will_tell() -> None:
     assert errors[-1, 2] < min(0.0055, 0.5 * errors[0, 2])
     assert any(max(np.abs(step.turn)) > 0.6 for step in found.steps)
     own, shared = 0.012 * scenes.PITCH, 0.004 * scenes.PITCH
-    before = planning._Before(camera, calibration, scenes.BOARD, metrology.noise.Noise(np.ones(1), 0.0), True)
+    before = planning._Before(camera, calibration, scenes.BOARD, Noise(np.ones(1), 0.0), True)
     rng, rows = np.random.default_rng(5), []
     for frame, step in enumerate(found.steps):
         where = drawn.pose(step.turn, step.distance, scenes.BOARD)
