@@ -77,7 +77,7 @@ def test_each_cause_is_named_with_its_size(name, lumigraph, tmp_path, intended):
         assert numbers(text, r"lenslets, (\S+) mm from where") == pytest.approx([MOVE * 1e3], abs=0.03)
     if name in ("open", "closed"):
         factor = {"open": 1.15, "closed": 0.8}[name]
-        verb, word = {"open": ("close", "overlap by"), "closed": ("open", "gaps of")}[name]
+        verb, word = {"open": ("close", "overlaps of"), "closed": ("open", "gaps of")}[name]
         right = np.array([factor, 1]) * intended.main_lens.diameter * 1e3
         assert numbers(text, rf"{verb} the main lens from (\S+) to (\S+) mm") == pytest.approx(
             right, rel=0.03

@@ -2,6 +2,7 @@
 
 import math
 import sys
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -55,15 +56,26 @@ class Lens:
         return Rays(along, across, place, x, path + 1.0 + along * y + across * x)
 
 
-@pytest.fixture(scope="module")
-def known():
-    """Every prescription of this module is `Lens`."""
+@contextmanager
+def known_lenses():
+    """Every prescription is `Lens` inside of it; nothing of that is remembered before or after."""
+    forget()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LUMIGRAPH_CACHE", "off")
         patch.setattr(glass, "Prescription", Lens)
         yield
+    forget()
+
+
+def forget():
     glass._glass.cache_clear()
     glass._first_order.cache_clear()
+
+
+@pytest.fixture
+def known():
+    with known_lenses():
+        yield
 
 
 def single(path, **lens):
@@ -74,18 +86,8 @@ def single(path, **lens):
     )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def unread(known, tmp_path_factory):
-    """Name of a prescription, for cameras that the whole module shares."""
-    path = tmp_path_factory.mktemp("glass") / "known.zmx"
-    path.write_text("not read")
-    return path
-
-
 @pytest.fixture
 def camera(known, tmp_path):
-    glass._glass.cache_clear()
-    glass._first_order.cache_clear()
     path = tmp_path / "known.zmx"
     path.write_text("not read")
     return single(path)
@@ -191,10 +193,18 @@ def plenoptic(camera):
 
 
 @pytest.fixture(scope="module")
-def strip(unread):
+def whole_strip(tmp_path_factory):
+    path = tmp_path_factory.mktemp("glass") / "known.zmx"
+    path.write_text("not read")
+    with known_lenses():
+        camera = plenoptic_behind(path).replace(lenslets={"count": (9, 31)})
+        return camera, lg.simulate(camera, lg.targets.white(), lg.Incoherent(1e-2))
+
+
+@pytest.fixture
+def strip(whole_strip, known):
     """Nine rows of lenslets across the whole field, and their white image."""
-    camera = plenoptic_behind(unread).replace(lenslets={"count": (9, 31)})
-    return camera, lg.simulate(camera, lg.targets.white(), lg.Incoherent(1e-2))
+    return whole_strip
 
 
 @pytest.mark.long
