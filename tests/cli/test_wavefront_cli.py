@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import tifffile
-from tests.adaptive.test_sense import CAMERA, exposed
+from tests.studies.adaptive.test_sense import CAMERA, exposed
 
 import lumigraph as lg
 from lumigraph.cli.wavefront import _place

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.information.test_microscope_slopes import OTHER, PLAIN, ROUND, UM, Key, scope, waves_alike
+from tests.studies.information.test_microscope_slopes import OTHER, PLAIN, ROUND, UM, Key, scope, waves_alike
 from tests.operators.test_part_images import off, peak
 
 import lumigraph as lg

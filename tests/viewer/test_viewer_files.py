@@ -19,7 +19,7 @@ from lumigraph.io.webp import encode
 from lumigraph.rendering.refocus import shifts
 from lumigraph.viewer import single_file
 from lumigraph.viewer.encoding import Coded, white_level
-from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, detail, focal_stack, focus_range
+from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, focal_stack, focus_range
 from lumigraph.viewer.opening import is_camera, of_raw, of_stack, of_views, of_volume, open_exhibit, rendered
 from lumigraph.viewer.page import MODULES, static
 from lumigraph.viewer.parts import Parts

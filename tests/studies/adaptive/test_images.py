@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.adaptive.test_estimate import SCOPE, UNIT
+from tests.studies.adaptive.test_estimate import SCOPE, UNIT
 
 import lumigraph as lg
 from lumigraph.deconvolution import Exposure

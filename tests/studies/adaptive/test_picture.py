@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
-from tests.adaptive.test_estimate import SCOPE
+from tests.studies.adaptive.test_estimate import SCOPE
 
 import lumigraph as lg
 from lumigraph.deconvolution import Exposure

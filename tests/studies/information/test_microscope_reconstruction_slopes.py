@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.information.test_microscope_slopes import UM, scope
-from tests.information.test_reconstruction_slopes import Matrix
+from tests.studies.information.test_microscope_slopes import UM, scope
+from tests.studies.information.test_reconstruction_slopes import Matrix
 
 import lumigraph as lg
 from lumigraph.operators.lenslets.part_volume import PartVolume
