@@ -196,7 +196,7 @@ def test_vignetting_is_what_a_white_image_shows_over_many_lenslets():
     ("arguments", "message"),
     [
         (("--depth", "1 um:2 um"), "must be first:last:step"),
-        (("--depth", "2 um:1 um:1 um"), "must ascend"),
+        (("--depth", "2 um:1 um:1 um"), "must lead from its first to its last value"),
         (("--depth", "0 um:1 m:1 nm"), "must have 1 to 1000"),
         (("--depth", "1 um, 1 um"), "names a depth twice"),
         (("--depth", "3"), "--depth"),

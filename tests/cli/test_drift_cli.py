@@ -45,12 +45,12 @@ def test_a_raw_image_off_its_calibration_is_told_so(verb, lumigraph, drawn):
     assert "has a pitch of 13.400 px" in refused.err
     assert refused.err.count("\n") == 1
     for name, told in (("slips", "12.600 px"), ("shifted", "stand (-4.5,")):
-        warned = lumigraph(*words, "--calibration", f"{name}.toml")
+        warned = lumigraph(*words, "--calibration", f"{name}.toml", "--overwrite")
         assert warned.code == 0, warned.err
         assert "warning" in warned.err
         assert told in warned.err
         assert warned.err.count("12.4") == 1, "told once"
-    assert "12.4" not in lumigraph(*words, "--calibration", "fits.toml").err
+    assert "12.4" not in lumigraph(*words, "--calibration", "fits.toml", "--overwrite").err
 
 
 @pytest.mark.usefixtures("drawn")
@@ -66,7 +66,7 @@ def test_deconvolve_refuses_a_calibration_that_drifted(lumigraph, tmp_path):
     assert (refused.code, refused.err.count("\n")) == (1, 1)
     assert "repeats every 12.400 px" in refused.err
     assert "has a pitch of 13.400 px" in refused.err
-    assert "12.4" not in lumigraph(*words, "--calibration", "fits.toml").err
+    assert "12.4" not in lumigraph(*words, "--calibration", "fits.toml", "--overwrite").err
 
 
 @pytest.mark.usefixtures("drawn")

@@ -36,7 +36,7 @@ def test_a_table_of_bounds_is_printed_and_a_report_written(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--depth", "nan um"], "depths"),
+        (["--depth", "nan um"], "'nan um' is not a quantity"),
         (["--depth", "1 um", "--photons", "-3"], "photons"),
         (["--depth", "1 um", "--background", "nan"], "background"),
         (["--depth", "1 um", "--places", "0"], "places"),

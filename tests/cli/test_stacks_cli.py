@@ -25,7 +25,7 @@ def test_verbs_take_a_page_of_a_stack_and_refuse_one_without_it(lumigraph, film)
     assert "Give one of them." in lumigraph("decode", "raws.tiff", "--page", 2, *words).err
     assert lumigraph("decode", "raws.tiff", "--page", 1, *words).code == 0
     second = io.open("views.zarr").data
-    assert lumigraph("decode", "raw.tiff", *words).code == 0
+    assert lumigraph("decode", "raw.tiff", *words, "--overwrite").code == 0
     np.testing.assert_array_equal(second, io.open("views.zarr").data)
 
 

@@ -99,7 +99,7 @@ def test_every_verb_says_in_one_line_what_the_picture_implies_about_the_camera_f
     assert said.code == 0, said.err
     told = "by the camera file it has 12.500 px (square): they agree"
     assert (said.out.count(told), said.err.count(told)) == (1, 0)
-    said = microscope(*VERBS[verb], "--camera", "differs.toml")
+    said = microscope(*VERBS[verb], "--camera", "differs.toml", "--overwrite")
     assert said.code == 0, said.err
     implied = "a relay of 1.02 instead of 1" if verb != "render" else "pixels of 8 µm instead of 8.16 µm"
     told = f"by the camera file it has 12.255 px (square): {implied}. The picture's lattice is used"

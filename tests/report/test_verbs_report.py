@@ -50,8 +50,10 @@ def test_a_verb_writes_its_page(folder, capsys, command, figures):
 
 
 def test_a_report_that_cannot_be_written_is_refused_first(folder, capsys):
-    assert main(["refocus", "views.zarr", "--alpha", "1", "-o", "x.png", "--report", "no/x.html"]) == 1
-    assert "folder no" in capsys.readouterr().err
+    assert (
+        main(["refocus", "views.zarr", "--alpha", "1", "-o", "x.png", "--report", "camera.toml/x.html"]) == 1
+    )
+    assert "camera.toml is a file, not a folder" in capsys.readouterr().err
     assert not (folder / "x.png").exists()
     assert main(["design", "camera.toml", "--report", "page.pdf"]) == 1
     assert main(["design", "camera.toml", "--no-open"]) == 1

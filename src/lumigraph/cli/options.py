@@ -5,7 +5,6 @@ import re
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -26,16 +25,21 @@ WARNED: ContextVar[list[str]] = ContextVar("WARNED")
 """Warnings that it has printed."""
 
 
-_COUNTED, _LAST = count(), 1000
+SECTIONS = (
+    "Raw image", "Known beforehand", "Sampling", "Focus", "Picture", "Raw images of cameras 2.0",
+    "Views of cameras 1.0", "Search", "Lengths", "Light", "Scene", "Object", "Method", "Adaptive optics",
+    "Several raw images", "Region", "Dark images", "Goal", "Designer", "Page", "Workers", "Output",
+)  # fmt: skip
+"""Sections of verbs' help, in their order."""
 
 
 @cache  # the options of one section may stand in several classes
-def section(title: str, *, last: bool = False) -> Group:
-    """Section of a verb's help: those of a verb stand in the order of their making, the last at the end."""
-    return Group(title, sort_key=_LAST if last else next(_COUNTED))
+def section(title: str) -> Group:
+    """Section of a verb's help, one of `SECTIONS`."""
+    return Group(title, sort_key=SECTIONS.index(title))
 
 
-@Parameter(name="*", group=section("Output", last=True))
+@Parameter(name="*", group=section("Output"))
 @dataclass(frozen=True)
 class Common:
     """Options of every verb.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lumigraph.report import Page
 
 
-@Parameter(name="*", group=section("Output", last=True))
+@Parameter(name="*", group=section("Output"))
 @dataclass(frozen=True)
 class ReportOptions(Common):
     """Options of every verb that computes.

@@ -98,7 +98,10 @@ def is_shown(word: str) -> bool:
     if not word or word.startswith("-"):
         return False
     path = Path(word)
-    return path.is_file() or (path.is_dir() and (path.suffix != "" or (path / "views.json").is_file()))
+    try:
+        return path.is_file() or (path.is_dir() and (path.suffix != "" or (path / "views.json").is_file()))
+    except OSError:  # longer than any name of a file
+        return False
 
 
 def view(
