@@ -1,4 +1,4 @@
-"""Names that docs/reference/api.md lists: each is there in a process that has imported nothing else of lumigraph."""
+"""Names that docs/reference/api.md lists: each is there in a process that has imported nothing else."""
 
 import json
 import os
@@ -12,7 +12,8 @@ import pytest
 
 import lumigraph as lg
 
-BEFORE, _, AFTER = (Path(__file__).parents[1] / "docs/reference/api.md").read_text().partition("Modules\n-------")
+PAGE = (Path(__file__).parents[1] / "docs" / "reference" / "api.md").read_text()
+BEFORE, _, AFTER = PAGE.partition("Modules\n-------")
 NOUNS_AND_VERBS, MODULES = (re.findall(r"^   (\w+)$", text, re.M) for text in (BEFORE, AFTER))
 
 # What is slow and not ours is imported once; each child then imports lumigraph for itself.

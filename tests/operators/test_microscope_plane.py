@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.studies.information.test_microscope_slopes import OTHER, PLAIN, ROUND, UM, Key, scope, waves_alike
 from tests.operators.test_part_images import off, peak
+from tests.studies.information.test_microscope_slopes import OTHER, PLAIN, ROUND, UM, Key, scope, waves_alike
 
 import lumigraph as lg
 from lumigraph.core.grid import Grid

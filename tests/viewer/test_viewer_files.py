@@ -16,6 +16,7 @@ from lumigraph.cli import main
 from lumigraph.core.stack import Stack
 from lumigraph.errors import CalibrationError, FormatError, LumigraphError
 from lumigraph.io.webp import encode
+from lumigraph.rendering.detail import detail
 from lumigraph.rendering.refocus import shifts
 from lumigraph.viewer import single_file
 from lumigraph.viewer.encoding import Coded, white_level
