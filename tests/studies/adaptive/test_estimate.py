@@ -159,7 +159,7 @@ RAW = np.ones((135, 135), np.float32)
     ("given", "message"),
     [
         ({"microscope": SCOPE.replace(configuration="2.0", lenslet_offset="1 mm")}, "configuration '1.0'"),
-        ({"microscope": lg.PlenopticCamera.from_catalogue("thesis-plenoptic-1")}, "stands a .picture."),
+        ({"microscope": lg.PlenopticCamera.from_catalogue("thesis-plenoptic-1")}, "need a .picture., flat"),
         ({"terms": (1, 2, 3, 4)}, "beads explain 1 to 4 themselves"),
         ({"terms": ()}, "Give others"),
         ({"terms": (0,)}, "Noll's index is 0"),
