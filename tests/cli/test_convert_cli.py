@@ -54,7 +54,7 @@ def test_a_calibration_goes_to_raytrix(lumigraph, files):
     assert lumigraph("convert", "hex.toml", "-o", "array.xml").code == 0
     assert lumigraph("convert", "array.xml", "--shape", *SHAPE, "-o", "again.toml").code == 0
     assert lg.open("again.toml").lattice.pitch == pytest.approx(23.3)
-    assert "the lattice is square" in lumigraph("convert", "square.toml", "-o", "array.xml").err
+    assert "the lattice is square" in lumigraph("convert", "square.toml", "-o", "square.xml").err
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,10 @@ def test_moved_adds_to_the_origin():
     ("build", "message"),
     [
         (lambda: Lattice(((0, 1), (0, 2))), "parallel: no lattice"),
-        (lambda: Lattice(((0, 1), (1, 0)), layout="tri"), "layout is 'tri' but must be 'square' or 'hex'"),
+        (
+            lambda: Lattice(((0, 1), (1, 0)), layout="tri"),
+            "layout is 'tri' but must be 'square', 'hex' or 'rectangular'",
+        ),
         (lambda: Lattice(((0, 1), (1, 0)), kinds=3), "kinds is 3 but must be 1, or 3 in a 'hex' layout"),
         (lambda: Lattice.square(0.0), "pitch is 0 m but must be above 0 m"),
         (lambda: Lattice.square(1.0).scaled(math.nan), "factor is nan but must be a finite number"),

@@ -257,7 +257,7 @@ def test_what_lftoolbox_cannot_hold_is_named(tmp_path):
     told = " / ".join(notes)
     for word in ("uncertainties", "tangential", "tilt (0.6, -0.9 mrad)", "3 kinds", "shear"):
         assert word in told
-    with pytest.raises(FormatError, match="the lattice is hexagonal"):
+    with pytest.raises(FormatError, match="the lattice is hex but"):
         lg.metrology.save_camera(CAMERA, calibration(HEX), path, "lftoolbox", directions=9)
     with pytest.raises(FormatError, match="Give directions=9"):
         lg.metrology.save_camera(FLAT, calibration(SQUARE), path, "lftoolbox")

@@ -187,7 +187,7 @@ def test_a_disk_that_cannot_be_written_is_no_error_unless_the_folder_is_the_call
     folder.write_text("a file where the folder should be")
     np.testing.assert_array_equal(store.kept("key", built)["left"], ARRAYS["left"])
     with pytest.raises(FormatError, match="was not written"):
-        store.kept("key", built, tmp_path / "none")
+        store.kept("key", built, folder / "none")
 
 
 def test_a_folder_of_the_callers_has_no_limit(tmp_path, monkeypatch):

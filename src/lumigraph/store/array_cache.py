@@ -52,7 +52,7 @@ def kept(
     build
         Computes them.
     where
-        An existing folder of the caller's, which has no limit; the user's cache folder if left out.
+        A folder of the caller's, which has no limit; the user's cache folder if left out.
 
     Raises
     ------

@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from lumigraph.calibration.vectors import UNEQUAL
 from lumigraph.core.calibration import Calibration
-from lumigraph.core.lattice import Lattice
+from lumigraph.core.lattice import Lattice, Layout
 from lumigraph.errors import FormatError
 from lumigraph.metrology.boards.camera import MetricCamera
 
@@ -242,13 +243,14 @@ def _pose(turn: np.ndarray, at: Any) -> dict[str, Any]:
 
 def _lattice(found: dict[str, Any]) -> Lattice:
     mesh = found["mia"]["mesh"]
-    layouts = {number: name for name, number in _GEOMETRIES.items()}
-    if int(mesh["geometry"]) not in layouts:
+    if int(mesh["geometry"]) not in _GEOMETRIES.values():
         raise FormatError(
             f"mia.mesh.geometry is {mesh['geometry']} but must be 0 (square) or 1 (rows of hexagons)."
         )
-    layout: Any = layouts[int(mesh["geometry"])]
     across, down = _row(mesh["pitch"], 2)
+    oblong = max(across, down) > UNEQUAL * min(across, down)
+    regular: Layout = "rectangular" if oblong else "square"
+    layout = "hex" if int(mesh["geometry"]) == _GEOMETRIES["hex"] else regular
     turn = _array(mesh["pose"]["rotation"]).reshape(2, 2).T
     row, column = turn @ [across, 0.0], turn @ [0.0, down]
     at = _row(mesh["pose"]["translation"], 2)
