@@ -37,4 +37,4 @@ class SamplingWarning(UserWarning):
 
 
 class ParaxialWarning(UserWarning):
-    """Parabolic lenses are farther from real ones than the accuracy that was asked for; how far is said."""
+    """Parabolic lenses or Fresnel propagation miss the accuracy asked for; the message says by how much."""

@@ -261,7 +261,7 @@ def test_python_mistakes_are_ours_too(make, error, message):
 def test_a_computed_sensor_that_is_too_large_is_refused():
     camera = load_camera("thesis-plenoptic-1").replace(sensor={"pixel_pitch": "50 nm"})
     with pytest.raises(
-        GeometryError, match=r"pixels are more than the 2\.68e\+08 that can be simulated\. Use"
+        GeometryError, match=r"pixels are more than the 2\.68e\+08 that can be simulated\. Check"
     ):
         camera.sensor
 

@@ -17,7 +17,6 @@ from lumigraph.propagation.angular_spectrum import transfer_function
 
 pytestmark = pytest.mark.filterwarnings(  # noise fills its window, and all of its frequencies
     "ignore:.* of the light left the window:lumigraph.errors.SamplingWarning",
-    "ignore:.* goes beyond the Fresnel approximation:lumigraph.errors.SamplingWarning",
 )
 
 WAVELENGTH = 633e-9

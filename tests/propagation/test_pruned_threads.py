@@ -13,7 +13,6 @@ from lumigraph.propagation import Propagate, propagate
 
 pytestmark = pytest.mark.filterwarnings(  # noise fills its window, and all of its frequencies
     "ignore:.* of the light left the window:lumigraph.errors.SamplingWarning",
-    "ignore:.* goes beyond the Fresnel approximation:lumigraph.errors.SamplingWarning",
 )
 
 

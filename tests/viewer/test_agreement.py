@@ -112,7 +112,7 @@ def test_pictures_of_three_kinds_of_lenslets_agree_to_a_grey_level(tmp_path, mon
         tmp_path / "raw.tiff", viewer.Origin(camera=lg.load_camera("camera.toml"), patch=camera.patch)
     )
     sizes, seen = shown.planes.positions, np.asarray(shown.planes.data)
-    patches = f"--patches={sizes[0]}:{sizes[-1]}:{len(sizes)}"
+    patches = f"--patches={sizes[0]}:{sizes[-1]}:x{len(sizes)}"
     assert main(["render", "raw.tiff", "--camera", "camera.toml", patches, "-o", "stack.tiff"]) == 0
     python = lg.render_stack(raw, camera.calibration, sizes, focus=camera.patches_on_raw())
     level = float(np.max(python)) / 255

@@ -10,7 +10,7 @@ from lumigraph.core import arrays, checks
 from lumigraph.core.arrays import Array
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
-from lumigraph.errors import GeometryError, SamplingError
+from lumigraph.errors import GeometryError, ParaxialWarning, SamplingError
 from lumigraph.propagation import plausible, sampling
 from lumigraph.propagation.angular_spectrum import (
     angular_spectrum,
@@ -148,9 +148,10 @@ def propagate(
     -----
     SamplingWarning
         The result is defined but aliases, light wraps round, or the band limit drops light that belongs to
-        the output; without `grid`, more than 1 % of the light left the window; the Fresnel approximation
-        makes more than 1 % rms of the field wrong; a smooth wave turns too fast for its samples. The message
-        gives the numbers.
+        the output; without `grid`, more than 1 % of the light left the window; a smooth wave turns too fast
+        for its samples. The message gives the numbers.
+    ParaxialWarning
+        The Fresnel approximation makes more than 1 % rms of the field wrong.
 
     References
     ----------
@@ -194,7 +195,7 @@ def _check(method: str, field: Field, distance: float, onto: tuple[Grid | None, 
     given, found = onto
     if method in ("fresnel", "multi_step_fresnel"):
         reached = given if method == "fresnel" else found.grid
-        sampling.warn(plausible.beyond_paraxial(method, field, distance, reached))
+        sampling.warn(plausible.beyond_paraxial(method, field, distance, reached), ParaxialWarning)
     if method == "fresnel":
         return
     sampling.warn(plausible.undersampled(field))

@@ -245,10 +245,10 @@ def light_wraps(
     return None
 
 
-def warn(message: str | None) -> None:
-    """Issue a `SamplingWarning` in the name of whoever called this package, if there is anything to say."""
+def warn(message: str | None, category: type[UserWarning] = SamplingWarning) -> None:
+    """Issue a warning in the name of whoever called this package, if there is anything to say."""
     if message:
         level, frame = 2, sys._getframe(1)
         while frame.f_back and str(frame.f_globals.get("__name__")).startswith("lumigraph.propagation"):
             level, frame = level + 1, frame.f_back
-        warnings.warn(message, SamplingWarning, stacklevel=level)
+        warnings.warn(message, category, stacklevel=level)
