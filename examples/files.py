@@ -28,7 +28,7 @@ def main() -> None:
     print(f"{same.data.shape} (v, u, t, s, c), as in the folder: {np.array_equal(same.data, views.data)}")
 
     alphas = np.linspace(0.97, 1.01, 9)
-    planes = np.stack([lg.refocus(views, alpha) for alpha in alphas])
+    planes = np.stack([lg.refocus(views, alpha, oversample=1) for alpha in alphas])
     lg.save(lg.Stack(planes, alphas, "alpha"), "focus.ome.tiff")
     lg.save(lg.Stack(planes), "focus.gif", fps=6)
     print(lg.contents("focus.ome.tiff")[0].about)

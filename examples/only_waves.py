@@ -18,7 +18,8 @@ def main() -> None:
     choice = lg.choose_method(grid, 316 * mm, 633 * nm)
     print(f"{choice.method}, because {choice.reason}")
 
-    train = lg.Train((lg.Propagate(316 * mm), lg.ThinLens(158 * mm, 5 * mm), lg.Propagate(316 * mm)))
+    leg = lg.Propagate(316 * mm, grid=grid)  # light beyond the window misses the lens
+    train = lg.Train((leg, lg.ThinLens(158 * mm, 5 * mm), leg))
     names = ("slit", "before the lens", "behind it", "image")
     lg.plots.planes(train.planes(field), names=names).savefig("planes.png")
 

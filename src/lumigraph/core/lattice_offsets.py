@@ -26,7 +26,7 @@ class LatticeOffsets:
 
     Examples
     --------
-    >>> Aside(np.array([[0, 1]]), np.array([[0.5, -0.25]])).of(np.array([[0, 0], [0, 1]])).tolist()
+    >>> LatticeOffsets(np.array([[0, 1]]), np.array([[0.5, -0.25]])).of(np.array([[0, 0], [0, 1]])).tolist()
     [[0.0, 0.0], [0.5, -0.25]]
     """
 

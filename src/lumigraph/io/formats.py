@@ -264,7 +264,7 @@ def contents(path: str | os.PathLike[str]) -> tuple[FilePart, ...]:
     >>> path = Path(tempfile.mkdtemp()) / "raw.tiff"
     >>> save(np.zeros((3, 4), np.uint8), path)
     >>> contents(path)
-    (Part(name='', noun='RawImage', about='3 x 4, uint8'),)
+    (FilePart(name='', noun='RawImage', about='3 x 4, uint8'),)
     """
     path = source.existing(path)
     row = format_of(path)

@@ -66,8 +66,9 @@ class Propagate:
     Examples
     --------
     >>> import numpy as np
-    >>> wave = Field(np.ones((64, 64), np.complex64), Grid.square(64, 10e-6), 633e-9)
-    >>> Propagate(1e-3)(wave).grid == wave.grid
+    >>> grid = Grid.square(64, 10e-6)
+    >>> beam = Field(np.exp(-(grid.y[:, None]**2 + grid.x**2) / 1e-8).astype(complex), grid, 633e-9)
+    >>> Propagate(1e-3)(beam).grid == grid
     True
     """
 

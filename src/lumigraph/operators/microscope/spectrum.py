@@ -105,8 +105,8 @@ def is_faster(kernels: Sequence[SliceKernel], told: Tiling, counts: tuple[int, i
 def sharing(told: Tiling) -> int:
     """Objects by whose products reading `R` counts for little: at most `SIDE`.
 
-    >>> from lumigraph.operators.microscope.tiles import Row
-    >>> [sharing(Tiling(*[Row(29, 0, 4, n)] * 2)) for n in (1, 2, 3)]
+    >>> from lumigraph.operators.microscope.tiles import TileRow
+    >>> [sharing(Tiling(*[TileRow(29, 0, 4, n)] * 2)) for n in (1, 2, 3)]
     [4, 2, 1]
     """
     return max(min(round(READ / (4 * told.count)), SIDE), 1)
