@@ -41,7 +41,7 @@ class ResultRow:
     --------
     >>> ResultRow("first zero", 48.9, "µm", thesis=67.0, expected=48.8, tolerance=0.3).passed
     True
-    >>> Row("SNR", 70.0, "dB", expected=57.0, tolerance=(0.0, np.inf)).passed
+    >>> ResultRow("SNR", 70.0, "dB", expected=57.0, tolerance=(0.0, np.inf)).passed
     True
     """
 
