@@ -124,6 +124,20 @@ def test_points_of_a_cell_repeat_from_lenslet_to_lenslet():
     assert spread(cell, range(5)).shape == (5, 2)
 
 
+def test_points_of_a_cell_fall_on_lenslets_of_each_kind_alike():
+    camera = lg.FocusedPlenopticCamera(
+        wavelength="600 nm", object_distance="120 mm", main_lens={"focal_length": "60 mm"},
+        lenslets={
+            "pitch": "150 um", "focal_length": ("5.2 mm", "5.0 mm", "5.4 mm"), "count": (9, 9),
+            "magnification": 0.5, "layout": "hex",
+        },
+        sensor={"pixel_pitch": "2 um"},
+    )  # fmt: skip
+    cell = source(camera, np.zeros(1), 1e-2).cell(2e-3) * camera.separation / 0.122
+    kinds = camera.lattice.kind(*camera.lattice.index(*spread(cell, range(3000)).T))
+    assert np.bincount(kinds, minlength=3) == pytest.approx([1000] * 3, abs=15)
+
+
 def _middle(image):
     return (image.sum(0) @ np.arange(image.shape[1])) / image.sum()
 
