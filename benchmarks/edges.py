@@ -8,7 +8,7 @@ import argparse
 
 import numpy as np
 
-from lumigraph.analysis import find_chart
+from lumigraph.analysis.chart import find_chart
 from lumigraph.metrology.datasheet import planes
 
 FINE = 8  # points to a sample

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from scipy.special import hankel1
 
-from lumigraph.elements import GlassSurface
+from lumigraph.elements.surface import GlassSurface
 from lumigraph.units import um
 
 INDEX, WAVELENGTH = 1.5, 550e-9

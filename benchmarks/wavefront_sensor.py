@@ -22,8 +22,9 @@ import lumigraph as lg
 from lumigraph.deconvolution import Exposure
 from lumigraph.elements.zernike import noll_to_nm, zernike
 from lumigraph.scene import Points
-from lumigraph.studies.adaptive import MODES, sense, start
+from lumigraph.studies.adaptive import sense, start
 from lumigraph.studies.adaptive.checked import bent
+from lumigraph.studies.adaptive.sense import MODES
 from lumigraph.studies.adaptive.star import StarImages
 from lumigraph.studies.information.points import CameraSource
 

@@ -79,9 +79,9 @@ def test_views_are_written_as_hdf5_and_a_film(tmp_path):
 def test_the_server_answers(tmp_path):
     from uvicorn import Config
 
-    from lumigraph.viewer import Resource, Site
+    from lumigraph.viewer import Site
     from lumigraph.viewer.connections import Connection
-    from lumigraph.viewer.server import application
+    from lumigraph.viewer.server import Resource, application
 
     app = application(Site({"": Resource("text/html", b"page")}), "token", frozenset())
     assert Config(app, http=Connection).load() is None

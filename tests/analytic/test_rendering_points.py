@@ -7,7 +7,8 @@ import pytest
 
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
-from lumigraph.rendering import decode, refocus, refocus_fourier, refocus_stack, render, rendered_grid
+from lumigraph.rendering import decode, refocus, refocus_fourier, refocus_stack, render
+from lumigraph.rendering.focused import rendered_grid
 from lumigraph.rendering.geometry import Frame
 
 PIXEL, SEPARATION, DISTANCE = 5e-6, 0.2, 4e-3
@@ -166,7 +167,7 @@ def test_a_map_of_patches_renders_each_depth_with_its_own():
     calibration = Calibration(lattice, shape, NONE, NONE, 0.0)
     near, far = focused_raw(lattice, shape, 0.5), focused_raw(lattice, shape, 0.35)
     raw = np.where(np.arange(250) < 132, near, far)  # 132: the border between two micro-images
-    from lumigraph.rendering import lenslet_indices
+    from lumigraph.rendering.patches import lenslet_indices
 
     columns = lattice.position(lenslet_indices(calibration))[..., 1]
     patches = np.where(columns < 132, 12.0, 0.35 * 24)

@@ -10,7 +10,7 @@ import zarr
 import lumigraph as lg
 from cameras import focused
 from lumigraph.cli import main
-from lumigraph.samples import Draws
+from lumigraph.samples.dataset import Draws
 from lumigraph.samples.drawn import LAYOUTS
 
 DEPTHS = ["--depth", "-6 mm:6 mm:6 mm"]

@@ -9,8 +9,8 @@ import pytest
 import lumigraph as lg
 from data_folder import real
 from lumigraph.core.progress import silent
-from lumigraph.processing import recognise
 from lumigraph.processing.notes import mattering
+from lumigraph.processing.recognise import recognise
 from lumigraph.processing.steps import Step, Steps
 
 FILES = {

@@ -11,7 +11,6 @@ from deconvolution.models import Matrix, blurred, disc
 from lumigraph import store
 from lumigraph.core.arrays import to_numpy
 from lumigraph.deconvolution import (
-    Checkpoint,
     Deconvolver,
     Exposure,
     Interrupted,
@@ -22,6 +21,7 @@ from lumigraph.deconvolution import (
     TotalVariation,
     Wavelets,
 )
+from lumigraph.deconvolution.checkpoint import Checkpoint
 from lumigraph.deconvolution.methods import State
 from lumigraph.deconvolution.problem import Problem, Scale
 from lumigraph.store import atomic

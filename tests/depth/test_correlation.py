@@ -14,7 +14,8 @@ from lumigraph.depth import correlation, metric, virtual_depth
 from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.preparation import prepare
-from lumigraph.rendering import lenslet_indices, render
+from lumigraph.rendering import render
+from lumigraph.rendering.patches import lenslet_indices
 from lumigraph.scene import Scene, Slice, targets
 from lumigraph.simulation import Incoherent, simulate
 

@@ -6,7 +6,8 @@ import pytest
 from lumigraph.core.arrays import namespace, to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
-from lumigraph.depth import BiasCurve, DepthMap, from_focus, point_alpha, sharpness
+from lumigraph.depth import BiasCurve, DepthMap, from_focus
+from lumigraph.depth.from_focus import point_alpha, sharpness
 from lumigraph.errors import CalibrationError, GeometryError
 
 ALPHAS = np.linspace(0.8, 1.2, 21)

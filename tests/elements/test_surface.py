@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
 
-from lumigraph.elements import GlassSurface
-from lumigraph.elements.surface import index_at
+from lumigraph.elements.surface import GlassSurface, index_at
 from lumigraph.errors import GeometryError
 
 WAVELENGTH = 550e-9

@@ -17,7 +17,7 @@ import numpy as np
 
 import lumigraph as lg
 from lumigraph import demo, store
-from lumigraph.deconvolution import Checkpoint
+from lumigraph.deconvolution.checkpoint import Checkpoint
 from lumigraph.store import atomic
 from lumigraph.studies import thesis
 from lumigraph.studies.thesis import run as reproduce

@@ -5,8 +5,7 @@ import pytest
 
 import lumigraph as lg
 from lumigraph import FocusedPlenopticCamera, GeometryError, PlenopticCamera
-from lumigraph.elements import GlassSurface
-from lumigraph.elements.surface import index_at
+from lumigraph.elements.surface import GlassSurface, index_at
 
 
 def camera(kind=PlenopticCamera, **lenslets):

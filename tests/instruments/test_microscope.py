@@ -179,7 +179,7 @@ def test_a_killed_run_goes_on_to_the_same_volume(scope, rng, tmp_path):
         if step.iteration == 3:
             raise Killed
 
-    from lumigraph.deconvolution import Checkpoint
+    from lumigraph.deconvolution.checkpoint import Checkpoint
 
     checkpoint = Checkpoint(tmp_path / "run.npz", every=0.0)
     with pytest.raises(Killed):

@@ -7,7 +7,7 @@ import pytest
 
 import lumigraph as lg
 from cameras import focused
-from lumigraph.elements import FieldPlate, ZernikeMap
+from lumigraph.elements.field_plate import FieldPlate, ZernikeMap
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments.over_field import read
 from lumigraph.units import nm

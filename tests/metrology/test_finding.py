@@ -11,8 +11,9 @@ from scipy.spatial import KDTree
 
 import lumigraph as lg
 from lumigraph import io, metrology
-from lumigraph.analysis import PupilEdge, find_chart
+from lumigraph.analysis.chart import find_chart
 from lumigraph.analysis.crossings import crossed
+from lumigraph.analysis.pupil_edge import PupilEdge
 from lumigraph.cli import main
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid

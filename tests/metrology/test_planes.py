@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from lumigraph.analysis import Chart, find_chart
+from lumigraph.analysis import Chart
+from lumigraph.analysis.chart import find_chart
 from lumigraph.errors import SamplingError
 from lumigraph.metrology.datasheet import planes
 

@@ -11,7 +11,8 @@ from lumigraph.operators.periodic import white
 from lumigraph.operators.periodic.coherent import disc
 from lumigraph.operators.sampling.optics import Optics
 from lumigraph.operators.sampling.resampling import averaged
-from lumigraph.sensor import AngularResponse, Sensor, integrate
+from lumigraph.sensor import Sensor, integrate
+from lumigraph.sensor.angular import AngularResponse
 from lumigraph.units import deg, mm, nm, um
 
 LENSLETS = {"pitch": 80 * um, "focal_length": 0.6 * mm, "magnification": 0.5}

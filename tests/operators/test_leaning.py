@@ -7,7 +7,7 @@ import pytest
 
 import lumigraph as lg
 from cameras import focused
-from lumigraph.elements import TiltAndBow
+from lumigraph.elements.tilt import TiltAndBow
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import Built
 from lumigraph.operators.lenslets.points import points_image

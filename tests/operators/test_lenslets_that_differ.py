@@ -7,7 +7,8 @@ import pytest
 
 import lumigraph as lg
 from cameras import focused
-from lumigraph.elements import LensletArray, Scatter, form
+from lumigraph.elements import LensletArray, form
+from lumigraph.elements.scatter import Scatter
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import Built
 from lumigraph.operators.lenslets.points import points_image

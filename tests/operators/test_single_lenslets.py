@@ -9,7 +9,8 @@ from tests.operators.test_part_each import direct, off
 import lumigraph as lg
 from cameras import focused
 from lumigraph.core.lattice_offsets import LatticeOffsets
-from lumigraph.elements import LensletArray, Scatter, SingleLenslet
+from lumigraph.elements import LensletArray
+from lumigraph.elements.scatter import Scatter, SingleLenslet
 from lumigraph.errors import CalibrationError, FormatError, GeometryError
 from lumigraph.scene import Points, Scene
 from lumigraph.units import mm, um

@@ -14,7 +14,8 @@ from lumigraph.core.prepared import Reason
 from lumigraph.core.stack import Stack
 from lumigraph.deconvolution import Exposure
 from lumigraph.errors import CalibrationError, FormatError, SamplingWarning
-from lumigraph.preparation import given, read_pages
+from lumigraph.preparation import given
+from lumigraph.preparation.given import read_pages
 
 PITCH, OFFSET = 12.4, 50.0
 

@@ -12,15 +12,9 @@ from lumigraph.core.lattice import Lattice
 from lumigraph.core.warp import Warp
 from lumigraph.errors import GeometryError, SamplingWarning
 from lumigraph.instruments import FocusedPlenopticCamera
-from lumigraph.rendering import (
-    lenslet_indices,
-    match_kinds,
-    render,
-    render_stack,
-    rendered_grid,
-    sharp_patches,
-    super_resolve,
-)
+from lumigraph.rendering import match_kinds, render, render_stack, sharp_patches, super_resolve
+from lumigraph.rendering.focused import rendered_grid
+from lumigraph.rendering.patches import lenslet_indices
 
 NONE = np.zeros((0, 2))
 SHAPE = (210, 250)

@@ -18,19 +18,17 @@ from lumigraph.errors import CalibrationError, GeometryError, LumigraphError
 from lumigraph.rendering import (
     decode,
     encode,
-    lenslet_mosaic,
-    point_of_view,
     reduce_aperture,
     refocus,
     refocus_fourier,
     refocus_stack,
     render,
-    rendered_grid,
     sub_aperture,
     views_from_mosaic,
-    views_mosaic,
 )
+from lumigraph.rendering.focused import rendered_grid
 from lumigraph.rendering.geometry import largest_rectangle
+from lumigraph.rendering.views import lenslet_mosaic, point_of_view, views_mosaic
 
 NONE = np.zeros((0, 2))
 

@@ -6,7 +6,8 @@ import pytest
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError
-from lumigraph.sensor import Sensor, integrate, integrate_adjoint
+from lumigraph.sensor import Sensor, integrate
+from lumigraph.sensor.pixels import integrate_adjoint
 
 GRID = Grid((30, 41), (1e-6, 0.8e-6), (2e-6, -1e-6))
 

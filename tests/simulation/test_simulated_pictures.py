@@ -5,7 +5,8 @@ import pytest
 
 from lumigraph.calibration import calibrate
 from lumigraph.instruments import FocusedPlenopticCamera, PlenopticCamera
-from lumigraph.rendering import decode, refocus, refocus_stack, render, rendered_grid
+from lumigraph.rendering import decode, refocus, refocus_stack, render
+from lumigraph.rendering.focused import rendered_grid
 from lumigraph.scene import targets
 from lumigraph.simulation import Incoherent, simulate
 from lumigraph.units import mm, um

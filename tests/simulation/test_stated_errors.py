@@ -7,7 +7,7 @@ import pytest
 
 import cameras
 from lumigraph.core.grid import Grid
-from lumigraph.elements import GlassSurface
+from lumigraph.elements.surface import GlassSurface
 from lumigraph.elements.tilt import TiltAndBow
 from lumigraph.operators.lenslets import tilted_planes
 from lumigraph.operators.sampling import cells

@@ -20,8 +20,8 @@ import pytest
 from lumigraph.cli.options import Common
 from lumigraph.cli.serving import announce
 from lumigraph.errors import LumigraphError
-from lumigraph.viewer import Resource, Site, safety, serve
-from lumigraph.viewer.server import application
+from lumigraph.viewer import Site, safety, serve
+from lumigraph.viewer.server import Resource, application
 
 HOST = b"127.0.0.1:8000"
 SITE = Site(
@@ -308,7 +308,7 @@ def test_the_file_for_the_browser_goes_when_the_program_ends(tmp_path):
 
 
 def test_the_file_for_the_browser_never_takes_the_place_of_another(tmp_path):
-    from lumigraph.viewer import redirecting
+    from lumigraph.viewer.address import redirecting
 
     (tmp_path / "no folder").write_text("a file")
     one, two = redirecting("http://a/", tmp_path), redirecting("http://b/?'\"<", tmp_path)

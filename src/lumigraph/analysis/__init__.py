@@ -17,19 +17,17 @@ from lumigraph.analysis.beams import (
     divergence,
     overall_coherence,
 )
-from lumigraph.analysis.chart import Chart, find_chart
-from lumigraph.analysis.photon_transfer import PhotonTransfer, photon_transfer
+from lumigraph.analysis.chart import Chart
+from lumigraph.analysis.photon_transfer import photon_transfer
 from lumigraph.analysis.profiles import contrast, first_zero, full_width
 from lumigraph.analysis.psf import centroid, encircled_energy
-from lumigraph.analysis.pupil_edge import PupilEdge, pupil_edge
+from lumigraph.analysis.pupil_edge import pupil_edge
 from lumigraph.analysis.signal import rms_error, snr
 from lumigraph.analysis.slanted_edge import SlantedEdge, slanted_edge
 from lumigraph.analysis.transfer import cutoff, mtf
 
 __all__ = [
     "Chart",
-    "PhotonTransfer",
-    "PupilEdge",
     "SlantedEdge",
     "beam_quality",
     "beam_width",
@@ -39,7 +37,6 @@ __all__ = [
     "degree_of_coherence",
     "divergence",
     "encircled_energy",
-    "find_chart",
     "first_zero",
     "full_width",
     "mtf",

@@ -16,7 +16,7 @@
 
 from lumigraph.calibration.borders import aligned
 from lumigraph.calibration.devignette import devignette
-from lumigraph.calibration.diagnosis import Diagnosis, diagnose
+from lumigraph.calibration.diagnosis import diagnose
 from lumigraph.calibration.exact import exactly
 from lumigraph.calibration.following import followed
 from lumigraph.calibration.lattice_fit import calibrate

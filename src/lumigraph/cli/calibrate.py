@@ -63,7 +63,7 @@ class CameraOptions:
     def compared(self, found: "Calibration") -> tuple[str, ...]:
         """Comparison of the picture with the camera of --camera, in a line."""
         from lumigraph.instruments import load_camera
-        from lumigraph.preparation import implied
+        from lumigraph.preparation.agreement import implied
 
         camera = None if self.camera is None else load_camera(self.camera)
         return () if camera is None or camera.calibration is None else (implied(found.lattice, camera)[0],)
@@ -108,7 +108,7 @@ def calibrate(
     """
     from lumigraph import calibration as verbs
     from lumigraph import io
-    from lumigraph.preparation import read_pages
+    from lumigraph.preparation.given import read_pages
 
     common.check()
     if not white:

@@ -88,8 +88,8 @@ def dataset(
     """  # noqa: E501 - an example is one line
     from lumigraph.instruments import load_camera
     from lumigraph.instruments.varied import changed, combinations, values
-    from lumigraph.samples import Draws
     from lumigraph.samples import dataset as make
+    from lumigraph.samples.dataset import Draws
 
     files.check_output(output, (".zarr",))
     hands.check()

@@ -16,7 +16,8 @@ from lumigraph.errors import FormatError
 
 if TYPE_CHECKING:
     from lumigraph.core.progress import Progress
-    from lumigraph.metrology import ChartPlane, Charts, Sheet, SheetEntry
+    from lumigraph.metrology import Charts, SheetEntry
+    from lumigraph.metrology.datasheet.sheet import ChartPlane, Sheet
 
 _WIDTH = 320  # px of the page that a picture takes
 _MOST = 3  # cameras side by side

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from lumigraph.core.linear import Linear
     from lumigraph.core.prepared import PreparedImage
     from lumigraph.core.raw import RawImage
-    from lumigraph.deconvolution import Deconvolver, RunStep
+    from lumigraph.deconvolution import Deconvolver
+    from lumigraph.deconvolution.run import RunStep
     from lumigraph.instruments import Instrument
 
 

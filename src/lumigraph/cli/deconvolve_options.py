@@ -59,7 +59,7 @@ class RawImageOptions:
 
     def prepared(self, raw: "RawImage", camera: "Instrument") -> "PreparedImage":
         """The raw image as it was read, with what the model of a deconvolution takes."""
-        from lumigraph.preparation import Given
+        from lumigraph.preparation.given import Given
 
         given = Given(self.calibration, self.white, self.dark)
         ready = given.prepared(raw, camera=camera, mask=self._mask(raw.shape), divide=False)
@@ -76,7 +76,7 @@ class RawImageOptions:
 
     def frames(self, path: Path) -> "list[tuple[str, Any]]":
         """Raw images and what to add to the output's name for each."""
-        from lumigraph.preparation import read_pages
+        from lumigraph.preparation.given import read_pages
 
         found = read_pages(path, self.page)
         digits = len(str(max(found)))

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from lumigraph.core.prepared import PreparedImage
-    from lumigraph.deconvolution import RunStep
+    from lumigraph.deconvolution.run import RunStep
 
 
 def reached(step: "RunStep", gain: float | None) -> str:

@@ -90,7 +90,7 @@ def check_page(path: Path) -> None:
     FormatError
         It holds other things, or an input, or is another command's.
     """
-    from lumigraph.viewer import check_folder
+    from lumigraph.viewer.folder import check_folder
 
     _check_inputs(path)
     _check_writer(path)

@@ -82,7 +82,8 @@ class Frames:
 
     def __call__(self, item: dict[str, Any]) -> Any:
         """Output of the verb for one frame, as if it had been run for it alone."""
-        from lumigraph.cluster import FrameGroup, Values
+        from lumigraph.cluster import Values
+        from lumigraph.cluster.task import FrameGroup
 
         if "frames" in item:
             return FrameGroup(item["first"], item["count"], self._run(item["frames"]))
@@ -232,7 +233,7 @@ def runs(items: Sequence[dict[str, Any]], length: int) -> list[dict[str, Any]]:
 
 def _frames(path: Path, pages: str | None) -> Iterator[dict[str, Any]]:
     from lumigraph.cluster.inputs import known
-    from lumigraph.preparation import pages_of
+    from lumigraph.preparation.given import pages_of
 
     about = known(path)
     for number in [None] if pages is None or path.is_dir() else pages_of(path, pages):

@@ -15,7 +15,8 @@ from lumigraph.errors import FormatError
 if TYPE_CHECKING:
     import numpy as np
 
-    from lumigraph.analysis import PhotonTransfer, SlantedEdge
+    from lumigraph.analysis import SlantedEdge
+    from lumigraph.analysis.photon_transfer import PhotonTransfer
     from lumigraph.core.raw import RawImage
 
 
@@ -99,7 +100,7 @@ def measure(
     common.check()
     if what != "sensor" and dark != DarkOptions():
         raise FormatError(f"--dark, --exposure-time and --full-scale are for 'sensor', not for {what!r}.")
-    from lumigraph.preparation import read_pages
+    from lumigraph.preparation.given import read_pages
 
     opened = [page for path in pictures for page in read_pages(path, "all").values()]
     _check_count(what, len(opened))
@@ -238,7 +239,7 @@ def _noise(areas: "list[np.ndarray]") -> Result:
 
 def _sensor(areas: "list[np.ndarray]", bits: int | None, looked: RegionOptions, dark: DarkOptions) -> Result:
     from lumigraph.analysis import photon_transfer
-    from lumigraph.preparation import read_raw
+    from lumigraph.preparation.given import read_raw
     from lumigraph.units import parse
 
     if not dark.dark or len(dark.dark) % 2:

@@ -109,7 +109,7 @@ class GoalOptions:
 def _pictures(paths: Sequence[Path] | None) -> "list[np.ndarray]":
     """Grey pictures of scenes."""
     from lumigraph.metrology.datasheet.planes import grey
-    from lumigraph.preparation import read_raw
+    from lumigraph.preparation.given import read_raw
 
     return [grey(read_raw(one, "picture of a scene").data) for one in paths or ()]
 

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from lumigraph.instruments import Instrument
-    from lumigraph.studies.optimisation import Goal, Optimum
+    from lumigraph.studies.optimisation import Goal
+    from lumigraph.studies.optimisation.optimise import Optimum
     from lumigraph.studies.optimisation.tried import DrawnErrors
 
 NAMES = {"start": "as given", "swept": "the best of the first values"}

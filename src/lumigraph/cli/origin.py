@@ -59,7 +59,7 @@ class RawOptions:
     def read(self, path: Path) -> "RawImage":
         """The raw image in a file, or on the page of a stack."""
         from lumigraph.core.saturation import with_bits
-        from lumigraph.preparation import read_pages
+        from lumigraph.preparation.given import read_pages
 
         (found,) = read_pages(path, None if self.page is None else str(self.page), one=True).values()
         return with_bits(found, self.bit_depth)
@@ -140,7 +140,7 @@ class RawOptions:
         devignette
             True to divide by the white image; None for yes where there is one.
         """
-        from lumigraph.preparation import Given
+        from lumigraph.preparation.given import Given
 
         camera = self.described(use)
         if camera is None and self.calibration is None and self.white is None:

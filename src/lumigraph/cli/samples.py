@@ -38,7 +38,8 @@ def samples(
     """
     if output.exists() and not output.is_dir():
         raise FormatError(f"--output {output} is a file. Give a folder.")
-    from lumigraph.samples import NAMES, write
+    from lumigraph.samples import write
+    from lumigraph.samples.folder import NAMES
 
     with progress("samples") as shown:
         files = write(output, names or NAMES, size=size, progress=shown)

@@ -28,6 +28,6 @@ def announce(address: str, common: Common, *, no_open: bool) -> None:
     report(common, address, {"address": address})
     sys.stdout.flush()
     if not no_open:
-        from lumigraph.viewer import open_in_browser
+        from lumigraph.viewer.show import open_in_browser
 
         open_in_browser(address, line)

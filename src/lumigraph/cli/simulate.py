@@ -260,8 +260,9 @@ class SceneOptions:
         """The one picture as opaque slices at the depths of a map, which is resized with it."""
         import numpy as np
 
-        from lumigraph.preparation import read_raw
-        from lumigraph.scene import SeeingCamera, Slice, targets
+        from lumigraph.preparation.given import read_raw
+        from lumigraph.scene import Slice, targets
+        from lumigraph.scene.rgbd import SeeingCamera
 
         (picture,) = (p for p in _scene((self.scene or [""])[0], camera.scene_grid).parts)
         if not isinstance(picture, Slice) or not isinstance(camera, SeeingCamera):
@@ -388,7 +389,7 @@ def _scene(name: str, grid: "Grid") -> "Scene":
         return getattr(targets, name)(grid)
     if "." not in name and "/" not in name:
         raise FormatError(f"--scene {name!r} is unknown. Use {', '.join(SCENES)}, or a picture file.")
-    from lumigraph.preparation import read_raw
+    from lumigraph.preparation.given import read_raw
 
     return targets.photo(grid, read_raw(Path(name)).data)
 

@@ -17,7 +17,8 @@ from lumigraph.core.result import Figure, Quantity, Result
 from lumigraph.errors import FormatError, LumigraphError
 
 if TYPE_CHECKING:
-    from lumigraph.studies.tolerance import Study, ToleranceOutcome
+    from lumigraph.studies.tolerance.outcome import ToleranceOutcome
+    from lumigraph.studies.tolerance.study import Study
 
 Tolerances = Annotated[
     list[str] | None, Parameter(name=("--tolerance", "-t"), allow_leading_hyphen=True, negative="")
@@ -82,8 +83,9 @@ def tolerance(
     """  # noqa: E501 - an example is one line
     from lumigraph import cluster
     from lumigraph.instruments import load_camera
-    from lumigraph.studies.tolerance import Study, ToleranceTrials
     from lumigraph.studies.tolerance.making import check_camera
+    from lumigraph.studies.tolerance.study import Study
+    from lumigraph.studies.tolerance.trials import ToleranceTrials
 
     common.check()
     hands.check()

@@ -68,7 +68,7 @@ def twin(
     from lumigraph import metrology, store
     from lumigraph.instruments import load_camera
     from lumigraph.metrology.datasheet.charts import check_camera
-    from lumigraph.preparation import read_raw
+    from lumigraph.preparation.given import read_raw
 
     bench = metrology.BenchModel(check_camera(load_camera(camera)))
     unlit = None if dark is None else read_raw(dark, "dark image")

@@ -19,8 +19,8 @@ from lumigraph.errors import FormatError
 if TYPE_CHECKING:
     from lumigraph.core.prepared import PreparedImage
     from lumigraph.instruments import Instrument
-    from lumigraph.studies.adaptive import ViewSlopes
     from lumigraph.studies.adaptive import Wavefront as Found
+    from lumigraph.studies.adaptive.start import ViewSlopes
 
 
 def wavefront(

@@ -11,18 +11,15 @@
 """
 
 from lumigraph.cluster import inputs, slurm
-from lumigraph.cluster.entry import Entry
 from lumigraph.cluster.estimate import Estimate
 from lumigraph.cluster.run import Cluster, Local, Report, batch, page, rows, status
 from lumigraph.cluster.scheduler import Dask
-from lumigraph.cluster.task import FrameGroup, Values
+from lumigraph.cluster.task import Values
 
 __all__ = [
     "Cluster",
     "Dask",
-    "Entry",
     "Estimate",
-    "FrameGroup",
     "Local",
     "Report",
     "Values",

@@ -10,26 +10,23 @@
 - `checkpoint`: `Checkpoint`, a file from which an interrupted run resumes
 """
 
-from lumigraph.deconvolution.checkpoint import Checkpoint
 from lumigraph.deconvolution.deconvolve import Deconvolver, deconvolve, deconvolve_series
 from lumigraph.deconvolution.exposure import Exposure
 from lumigraph.deconvolution.filters import LowPass
 from lumigraph.deconvolution.least_squares import LeastSquares
 from lumigraph.deconvolution.methods import Stop
 from lumigraph.deconvolution.richardson_lucy import RichardsonLucy
-from lumigraph.deconvolution.run import Interrupted, RunStep
+from lumigraph.deconvolution.run import Interrupted
 from lumigraph.deconvolution.total_variation import TotalVariation
 from lumigraph.deconvolution.wavelets import Wavelets
 
 __all__ = [
-    "Checkpoint",
     "Deconvolver",
     "Exposure",
     "Interrupted",
     "LeastSquares",
     "LowPass",
     "RichardsonLucy",
-    "RunStep",
     "Stop",
     "TotalVariation",
     "Wavelets",

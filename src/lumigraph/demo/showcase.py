@@ -17,8 +17,8 @@ from lumigraph.demo.helix import helix
 from lumigraph.instruments import FocusedPlenopticCamera
 from lumigraph.plots import layout
 from lumigraph.rendering import refocus, render, sub_aperture
-from lumigraph.samples import camera_file, portrait, scene
-from lumigraph.samples.files import camera_path
+from lumigraph.samples import portrait, scene
+from lumigraph.samples.files import camera_file, camera_path
 from lumigraph.samples.still_life import LAYERS
 from lumigraph.units import mm, um
 

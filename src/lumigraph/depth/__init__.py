@@ -18,17 +18,15 @@ from lumigraph.depth.dense import dense
 from lumigraph.depth.drawn import drawn
 from lumigraph.depth.epi import epi
 from lumigraph.depth.estimate import estimate
-from lumigraph.depth.from_focus import BiasCurve, from_focus, point_alpha, sharpness
+from lumigraph.depth.from_focus import BiasCurve, from_focus
 from lumigraph.depth.fuse import fuse
 from lumigraph.depth.metric import cloud, defocus, metric, virtual_depth
-from lumigraph.depth.of_pixels import PixelDepth, of_lenslets, of_pixels
-from lumigraph.depth.pictures import measurable
+from lumigraph.depth.of_pixels import of_lenslets, of_pixels
 from lumigraph.depth.quantities import alpha_of, disparity_of
 
 __all__ = [
     "BiasCurve",
     "DepthMap",
-    "PixelDepth",
     "alpha_of",
     "cloud",
     "correlation",
@@ -40,12 +38,9 @@ __all__ = [
     "estimate",
     "from_focus",
     "fuse",
-    "measurable",
     "metric",
     "of_lenslets",
     "of_pixels",
-    "point_alpha",
-    "sharpness",
     "unbiased",
     "virtual_depth",
 ]

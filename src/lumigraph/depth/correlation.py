@@ -15,9 +15,9 @@ from lumigraph.depth.micro_images import MicroImages
 from lumigraph.depth.smooth import Stiffness, update
 from lumigraph.depth.volume import cheapest, semi_global
 from lumigraph.errors import CalibrationError, GeometryError, SamplingWarning
-from lumigraph.preparation import of_raw
-from lumigraph.rendering import lenslet_indices
+from lumigraph.preparation.prepare import of_raw
 from lumigraph.rendering.decode import check_raw
+from lumigraph.rendering.patches import lenslet_indices
 
 _STEP = 0.5  # between the sizes that are compared [px]
 WIDEST = 0.08, 0.6

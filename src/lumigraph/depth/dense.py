@@ -26,7 +26,7 @@ from lumigraph.depth.sightings import Sightings
 from lumigraph.depth.smooth import Stiffness, tears, update
 from lumigraph.depth.volume import box, cheapest, guided, rivals, semi_global
 from lumigraph.errors import SamplingWarning
-from lumigraph.preparation import of_raw
+from lumigraph.preparation.prepare import of_raw
 from lumigraph.rendering.decode import check_raw
 from lumigraph.rendering.patches import Patches, PatchLayout, checked_focus
 

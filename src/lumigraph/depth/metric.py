@@ -15,8 +15,8 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.depth.quantities import alpha_of
 from lumigraph.design import thin_lens
 from lumigraph.errors import CalibrationError, GeometryError
-from lumigraph.rendering import lenslet_indices
 from lumigraph.rendering.geometry import Frame
+from lumigraph.rendering.patches import lenslet_indices
 
 PULL = 2.4
 """How far diffraction pulls disparities of plenoptic cameras 1.0, in λ F/A² of the refocus factor.

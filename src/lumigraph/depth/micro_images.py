@@ -13,8 +13,8 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.progress import Progress
 from lumigraph.core.raw import RawImage
 from lumigraph.depth.flat import grey, lit_radius
-from lumigraph.rendering import lenslet_indices
 from lumigraph.rendering.interpolate import sample
+from lumigraph.rendering.patches import lenslet_indices
 
 _REACH = 1.8  # pitches: nearest neighbours, and the next ones, which in a multi-focus array have one kind
 _NEXT = 1.2  # pitches: beyond the nearest neighbours

@@ -10,7 +10,7 @@ from lumigraph.core.progress import Progress, silent, within
 from lumigraph.core.raw import RawImage
 from lumigraph.depth.correlation import correlation
 from lumigraph.depth.dense import dense
-from lumigraph.preparation import of_raw
+from lumigraph.preparation.prepare import of_raw
 from lumigraph.rendering import match_kinds
 
 _LENSLETS = 0.3  # of the time

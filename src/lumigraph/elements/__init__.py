@@ -15,33 +15,21 @@
 """
 
 from lumigraph.elements.apertures import CircularAperture, RectangularAperture
-from lumigraph.elements.field_plate import OF_ONE_LENS, FieldPlate, VignettedPupil, ZernikeMap
 from lumigraph.elements.lens import ThinLens
 from lumigraph.elements.lenslets import LensletArray
 from lumigraph.elements.masks import random_phase_mask, white_phase
 from lumigraph.elements.object_space import ObjectSpace
-from lumigraph.elements.scatter import Scatter, SingleLenslet
-from lumigraph.elements.surface import GlassSurface
-from lumigraph.elements.tilt import TiltAndBow
 from lumigraph.elements.train import Element, Train
 from lumigraph.elements.zernike import ZernikePlate, noll_to_nm, zernike
 
 __all__ = [
-    "OF_ONE_LENS",
     "CircularAperture",
     "Element",
-    "FieldPlate",
-    "GlassSurface",
     "LensletArray",
     "ObjectSpace",
     "RectangularAperture",
-    "Scatter",
-    "SingleLenslet",
     "ThinLens",
-    "TiltAndBow",
     "Train",
-    "VignettedPupil",
-    "ZernikeMap",
     "ZernikePlate",
     "noll_to_nm",
     "random_phase_mask",

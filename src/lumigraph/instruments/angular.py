@@ -5,7 +5,7 @@ from pydantic import model_validator
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.quantities import Angle, Fraction, NotNegative
-from lumigraph.sensor import AngularResponse
+from lumigraph.sensor.angular import AngularResponse
 
 
 class Angles(CameraTable):

@@ -4,7 +4,8 @@ import math
 
 from pydantic import model_validator
 
-from lumigraph.elements import Scatter, TiltAndBow
+from lumigraph.elements.scatter import Scatter
+from lumigraph.elements.tilt import TiltAndBow
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.quantities import Angle, Displacement, Length, NotNegative, Seed, Tilt

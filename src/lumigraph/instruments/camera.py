@@ -18,7 +18,8 @@ from lumigraph.core.linear import Linear, Sum
 from lumigraph.core.progress import Progress, part
 from lumigraph.design import plenoptic1, resolution, thin_lens
 from lumigraph.design.layout import Layout, LensletLayout
-from lumigraph.elements import FieldPlate, LensletArray, ThinLens, Train, ZernikePlate
+from lumigraph.elements import LensletArray, ThinLens, Train, ZernikePlate
+from lumigraph.elements.field_plate import FieldPlate
 from lumigraph.errors import GeometryError, ParaxialWarning
 from lumigraph.instruments import parameters
 from lumigraph.instruments.glass import GlassRequest, LensGlass, first_order, glass

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from lumigraph.design import thin_lens
-from lumigraph.elements import VignettedPupil, ZernikeMap, noll_to_nm, zernike
+from lumigraph.elements import noll_to_nm, zernike
+from lumigraph.elements.field_plate import VignettedPupil, ZernikeMap
 from lumigraph.errors import GeometryError
 from lumigraph.io.prescription import FirstOrder, Prescription, Rays, content
 from lumigraph.store import array_cache

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lumigraph.elements import FieldPlate, ObjectSpace, ThinLens, Train, VignettedPupil, ZernikeMap
+from lumigraph.elements import ObjectSpace, ThinLens, Train
+from lumigraph.elements.field_plate import FieldPlate, VignettedPupil, ZernikeMap
 from lumigraph.errors import GeometryError
 from lumigraph.instruments.glass import MARGIN, LensGlass
 from lumigraph.operators import CameraOptics

@@ -19,7 +19,9 @@ from lumigraph.core.linear import Linear
 from lumigraph.design import plenoptic1, resolution
 from lumigraph.design.layout import LensletLayout
 from lumigraph.design.matching import Diameters, diameters
-from lumigraph.elements import LensletArray, Scatter, TiltAndBow, Train
+from lumigraph.elements import LensletArray, Train
+from lumigraph.elements.scatter import Scatter
+from lumigraph.elements.tilt import TiltAndBow
 from lumigraph.errors import GeometryError
 from lumigraph.instruments import grids
 from lumigraph.instruments.built import Built

@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.lattice_offsets import LatticeOffsets
-from lumigraph.elements import GlassSurface, SingleLenslet
-from lumigraph.elements.surface import index_at
+from lumigraph.elements.scatter import SingleLenslet
+from lumigraph.elements.surface import GlassSurface, index_at
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.quantities import (

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, PlainSerializer, model_validator
 
-from lumigraph.elements import ZernikeMap
+from lumigraph.elements.field_plate import ZernikeMap
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.quantities import angles, noll_index, numbers, wavelengths

@@ -16,23 +16,12 @@
 - `header`: what lumigraph writes beside the pixels, as JSON
 """
 
-from lumigraph.io.calibration import load_calibration, save_calibration
-from lumigraph.io.formats import (  # lumigraph.open is meant to read like the builtin
-    FORMATS,
-    FilePart,
-    Format,
-    contents,
-    open,  # noqa: A004
-    opens_pages,
-    pages,
-    save,
-)
+from lumigraph.io.calibration import load_calibration
+from lumigraph.io.formats import FORMATS, contents, open, opens_pages, pages, save  # noqa: A004
 from lumigraph.io.target import check_target
 
 __all__ = [
     "FORMATS",
-    "FilePart",
-    "Format",
     "check_target",
     "contents",
     "load_calibration",
@@ -40,7 +29,6 @@ __all__ = [
     "opens_pages",
     "pages",
     "save",
-    "save_calibration",
 ]
 
 

@@ -21,7 +21,7 @@ from lumigraph.metrology.boards.triangulation import Triangulated, triangulate
 from lumigraph.metrology.datasheet.charts import ChartExposures, Charts, read_charts, save_charts
 from lumigraph.metrology.datasheet.lights import simulate_charts
 from lumigraph.metrology.datasheet.measure import datasheet
-from lumigraph.metrology.datasheet.sheet import ChartPlane, Sheet, SheetEntry
+from lumigraph.metrology.datasheet.sheet import SheetEntry
 from lumigraph.metrology.datasheet.simulated import MEASURES, is_measure, simulated
 from lumigraph.metrology.twin import BenchModel, Twin, corrected, twin
 
@@ -30,7 +30,6 @@ __all__ = [
     "BenchModel",
     "Board",
     "ChartExposures",
-    "ChartPlane",
     "Charts",
     "Corners",
     "Measured",
@@ -38,7 +37,6 @@ __all__ = [
     "Nominal",
     "Plan",
     "Pose",
-    "Sheet",
     "SheetEntry",
     "Triangulated",
     "Twin",

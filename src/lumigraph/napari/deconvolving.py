@@ -10,7 +10,8 @@ from magicgui.widgets import CheckBox, FileEdit, FloatSpinBox, LineEdit, SpinBox
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.progress import Progress, Stage, within
 from lumigraph.core.raw import RawImage
-from lumigraph.deconvolution import Interrupted, RichardsonLucy, RunStep, deconvolve
+from lumigraph.deconvolution import Interrupted, RichardsonLucy, deconvolve
+from lumigraph.deconvolution.run import RunStep
 from lumigraph.errors import LumigraphError
 from lumigraph.instruments import load_camera
 from lumigraph.instruments.smoothing import low_pass_of

@@ -11,7 +11,8 @@ from lumigraph.errors import LumigraphError
 from lumigraph.napari.panel import Panel, chosen
 from lumigraph.napari.shown import beside
 from lumigraph.napari.work import Job
-from lumigraph.rendering import focus_range, reduce_aperture, refocus
+from lumigraph.rendering import reduce_aperture, refocus
+from lumigraph.rendering.focus_range import focus_range
 
 _RESTING = 1.0  # α' of what was focused
 

@@ -124,6 +124,6 @@ class Depth(Panel):
 def _foci(views: LightField) -> Any:
     import numpy as np
 
-    from lumigraph.rendering import focus_range
+    from lumigraph.rendering.focus_range import focus_range
 
     return np.linspace(*focus_range(views), _FOCI)

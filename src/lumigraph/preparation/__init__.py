@@ -10,28 +10,18 @@
 - `given`: the files that come with a raw image
 """
 
-from lumigraph.core.prepared import PreparedImage, Reason
-from lumigraph.preparation.agreement import Described, implied
-from lumigraph.preparation.drift import Drift, drift
-from lumigraph.preparation.given import Given, pages_of, read_calibration, read_pages, read_raw, sharp_kinds
-from lumigraph.preparation.prepare import decode, of_raw, prepare, render, render_stack, super_resolve
+from lumigraph.core.prepared import PreparedImage
+from lumigraph.preparation.drift import drift
+from lumigraph.preparation.given import read_calibration, sharp_kinds
+from lumigraph.preparation.prepare import decode, prepare, render, render_stack, super_resolve
 from lumigraph.preparation.vignetting import vignetting
 
 __all__ = [
-    "Described",
-    "Drift",
-    "Given",
     "PreparedImage",
-    "Reason",
     "decode",
     "drift",
-    "implied",
-    "of_raw",
-    "pages_of",
     "prepare",
     "read_calibration",
-    "read_pages",
-    "read_raw",
     "render",
     "render_stack",
     "sharp_kinds",

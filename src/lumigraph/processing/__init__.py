@@ -10,6 +10,5 @@
 """
 
 from lumigraph.processing.process import Processed, process
-from lumigraph.processing.recognise import Guess, recognise
 
 __all__ = ["Guess", "Processed", "process", "recognise"]

@@ -18,7 +18,8 @@ from lumigraph.deconvolution.checkpoint import fingerprint
 from lumigraph.errors import FormatError
 from lumigraph.instruments import Instrument, load_camera
 from lumigraph.instruments.capabilities import Rendered
-from lumigraph.preparation import prepare, read_calibration, read_raw, sharp_kinds
+from lumigraph.preparation import prepare, read_calibration, sharp_kinds
+from lumigraph.preparation.given import read_raw
 from lumigraph.processing.recognise import Guess
 from lumigraph.rendering import check_arrangement
 

@@ -11,7 +11,8 @@ from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.progress import Progress
-from lumigraph.depth import PixelDepth, drawn, of_pixels
+from lumigraph.depth import drawn, of_pixels
+from lumigraph.depth.of_pixels import PixelDepth
 from lumigraph.instruments import Instrument
 from lumigraph.instruments.capabilities import Rendered, WithDepth
 from lumigraph.processing.shown import FRAMES, ends, save_film, save_picture

@@ -12,11 +12,14 @@ from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.progress import Progress
-from lumigraph.depth import alpha_of, disparity_of, drawn, epi, measurable
+from lumigraph.depth import alpha_of, disparity_of, drawn, epi
+from lumigraph.depth.pictures import measurable
 from lumigraph.errors import FormatError
 from lumigraph.processing.shown import FRAMES, ends, save_film, save_picture
 from lumigraph.processing.steps import Step
-from lumigraph.rendering import AllInFocus, all_in_focus, decode, detail, focus_range, refocus_stack
+from lumigraph.rendering import all_in_focus, decode, detail, refocus_stack
+from lumigraph.rendering.focus_range import focus_range
+from lumigraph.rendering.sharp import AllInFocus
 from lumigraph.viewer.exhibit import comfortable, grey_or_colour
 
 VIEWS = "views.zarr"

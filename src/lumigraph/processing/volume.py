@@ -11,7 +11,8 @@ from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.prepared import PreparedImage
 from lumigraph.core.progress import Progress, silent, within
 from lumigraph.core.volume import Volume
-from lumigraph.deconvolution import Deconvolver, RichardsonLucy, RunStep, Stop
+from lumigraph.deconvolution import Deconvolver, RichardsonLucy, Stop
+from lumigraph.deconvolution.run import RunStep
 from lumigraph.depth import drawn
 from lumigraph.instruments import Instrument
 from lumigraph.instruments.smoothing import low_pass_of

@@ -14,28 +14,18 @@ from lumigraph.rendering.arrangement import check_arrangement
 from lumigraph.rendering.decode import decode
 from lumigraph.rendering.detail import detail, finer
 from lumigraph.rendering.encode import encode
-from lumigraph.rendering.focus_range import focus_range, focus_span
-from lumigraph.rendering.focused import render, render_stack, rendered_grid, sight_grid
+from lumigraph.rendering.focused import render, render_stack, sight_grid
 from lumigraph.rendering.fourier_slice import refocus_fourier
 from lumigraph.rendering.kinds import match_kinds
-from lumigraph.rendering.patches import lenslet_indices, sharp_patches
+from lumigraph.rendering.patches import sharp_patches
 from lumigraph.rendering.paths import view_path
 from lumigraph.rendering.pixels import hot_pixels
 from lumigraph.rendering.refocus import refocus, refocus_stack
-from lumigraph.rendering.sharp import AllInFocus, all_in_focus
+from lumigraph.rendering.sharp import all_in_focus
 from lumigraph.rendering.super_resolution import super_resolve
-from lumigraph.rendering.views import (
-    arranged,
-    lenslet_mosaic,
-    point_of_view,
-    reduce_aperture,
-    sub_aperture,
-    views_from_mosaic,
-    views_mosaic,
-)
+from lumigraph.rendering.views import arranged, reduce_aperture, sub_aperture, views_from_mosaic
 
 __all__ = [
-    "AllInFocus",
     "all_in_focus",
     "arranged",
     "check_arrangement",
@@ -43,27 +33,20 @@ __all__ = [
     "detail",
     "encode",
     "finer",
-    "focus_range",
-    "focus_span",
     "hot_pixels",
-    "lenslet_indices",
-    "lenslet_mosaic",
     "match_kinds",
-    "point_of_view",
     "reduce_aperture",
     "refocus",
     "refocus_fourier",
     "refocus_stack",
     "render",
     "render_stack",
-    "rendered_grid",
     "sharp_patches",
     "sight_grid",
     "sub_aperture",
     "super_resolve",
     "view_path",
     "views_from_mosaic",
-    "views_mosaic",
 ]
 
 

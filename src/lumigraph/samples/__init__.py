@@ -10,25 +10,17 @@
 - `files`: their camera files, and a lens' prescription; `folder`: all of them as files
 """
 
-from lumigraph.samples.bench import BenchSample, bench
-from lumigraph.samples.dataset import Draws, dataset
-from lumigraph.samples.drawn import DrawnSample, drawn
-from lumigraph.samples.files import camera_file, lens_path
-from lumigraph.samples.folder import NAMES, write
-from lumigraph.samples.portrait import PortraitSample, glowing, portrait
-from lumigraph.samples.scene import SceneSample, scene
-from lumigraph.samples.volume import VolumeSample, volume
+from lumigraph.samples.bench import bench
+from lumigraph.samples.dataset import dataset
+from lumigraph.samples.drawn import drawn
+from lumigraph.samples.files import lens_path
+from lumigraph.samples.folder import write
+from lumigraph.samples.portrait import glowing, portrait
+from lumigraph.samples.scene import scene
+from lumigraph.samples.volume import volume
 
 __all__ = [
-    "NAMES",
-    "BenchSample",
-    "DrawnSample",
-    "Draws",
-    "PortraitSample",
-    "SceneSample",
-    "VolumeSample",
     "bench",
-    "camera_file",
     "dataset",
     "drawn",
     "glowing",

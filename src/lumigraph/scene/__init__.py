@@ -14,19 +14,16 @@ from lumigraph.scene import sources, targets
 from lumigraph.scene.extended import ExtendedSource
 from lumigraph.scene.line import SpectralLine
 from lumigraph.scene.medium import Medium
-from lumigraph.scene.rgbd import SeeingCamera
 from lumigraph.scene.schell import GaussianSchell
-from lumigraph.scene.volumes import Diffuser, Part, Points, Scene, Slice
+from lumigraph.scene.volumes import Diffuser, Points, Scene, Slice
 
 __all__ = [
     "Diffuser",
     "ExtendedSource",
     "GaussianSchell",
     "Medium",
-    "Part",
     "Points",
     "Scene",
-    "SeeingCamera",
     "Slice",
     "SpectralLine",
     "sources",

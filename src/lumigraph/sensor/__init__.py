@@ -5,9 +5,8 @@
 - `colour`: `mosaic`, a Bayer filter; `demosaic`, the colour picture behind one
 """
 
-from lumigraph.sensor.angular import AngularResponse
 from lumigraph.sensor.colour import demosaic, levels, mosaic
-from lumigraph.sensor.pixels import integrate, integrate_adjoint
+from lumigraph.sensor.pixels import integrate
 from lumigraph.sensor.sensor import Sensor
 
 __all__ = ["AngularResponse", "Sensor", "demosaic", "integrate", "integrate_adjoint", "levels", "mosaic"]

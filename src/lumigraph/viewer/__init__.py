@@ -14,29 +14,24 @@
 - `designer`, `designer_parameters`, `designer_curves`, `designer_point`: a camera as sliders
 """
 
-from lumigraph.viewer.address import redirecting
 from lumigraph.viewer.designer import designer_site
 from lumigraph.viewer.exhibit import Exhibit
-from lumigraph.viewer.folder import check_folder, export_folder, serve_folder
+from lumigraph.viewer.folder import export_folder, serve_folder
 from lumigraph.viewer.inline import view_inline
 from lumigraph.viewer.opening import Origin, open_exhibit
 from lumigraph.viewer.page import site
-from lumigraph.viewer.server import Resource, Site, serve
-from lumigraph.viewer.show import open_in_browser, show
+from lumigraph.viewer.server import Site, serve
+from lumigraph.viewer.show import show
 from lumigraph.viewer.single_file import export
 
 __all__ = [
     "Exhibit",
     "Origin",
-    "Resource",
     "Site",
-    "check_folder",
     "designer_site",
     "export",
     "export_folder",
     "open_exhibit",
-    "open_in_browser",
-    "redirecting",
     "serve",
     "serve_folder",
     "show",

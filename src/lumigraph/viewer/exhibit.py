@@ -16,7 +16,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
 from lumigraph.errors import LumigraphError
 from lumigraph.instruments.capabilities import WithDepth
-from lumigraph.rendering import focus_range, focus_span
+from lumigraph.rendering.focus_range import focus_range, focus_span
 
 _WIDEST, _COMFORTABLE = 0.8, 0.5  # spans of refocus factors about 1
 
@@ -138,7 +138,8 @@ def depth_of(views: LightField) -> Callable[[], DepthMap] | None:
 
     None where there is nothing to measure: one view, or views that are too small.
     """
-    from lumigraph.depth import alpha_of, epi, measurable
+    from lumigraph.depth import alpha_of, epi
+    from lumigraph.depth.pictures import measurable
 
     return (lambda: alpha_of(epi(grey_or_colour(views)), views)) if measurable(views) else None
 

@@ -25,12 +25,14 @@ from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError, SamplingWarning
 from lumigraph.instruments.capabilities import Decoded, Rendered, WithDepth, WithMainLens, WithObjective
-from lumigraph.preparation import Described, Given, prepare, read_pages, sharp_kinds
+from lumigraph.preparation import prepare, sharp_kinds
+from lumigraph.preparation.agreement import Described
+from lumigraph.preparation.given import Given, read_pages
 from lumigraph.viewer.exhibit import Exhibit, Planes, comfortable, depth_of, depth_of_pixels
 
 if TYPE_CHECKING:
     from lumigraph.instruments.loading import AnyCamera
-    from lumigraph.samples import PortraitSample
+    from lumigraph.samples.portrait import PortraitSample
 
 _CAMERA_FILE = 1 << 20  # bytes; camera files have some hundred
 _PATCHES = 25

@@ -8,7 +8,8 @@ from scipy.ndimage import uniform_filter
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
-from lumigraph.rendering import all_in_focus, focus_range, refocus
+from lumigraph.rendering import all_in_focus, refocus
+from lumigraph.rendering.focus_range import focus_range
 from lumigraph.rendering.refocus import shifts
 from lumigraph.viewer.encoding import Coded
 

@@ -11,8 +11,9 @@ from lumigraph.deconvolution import Exposure
 from lumigraph.elements.zernike import noll_to_nm
 from lumigraph.operators.lenslets.point_changes import point_changes
 from lumigraph.scene import Points
-from lumigraph.studies.adaptive import MODES, sense, start
+from lumigraph.studies.adaptive import sense, start
 from lumigraph.studies.adaptive.checked import bent
+from lumigraph.studies.adaptive.sense import MODES
 from lumigraph.studies.adaptive.star import StarImages
 from lumigraph.studies.adaptive.start import _left, _scatter, _slopes
 from lumigraph.studies.information.points import CameraSource

@@ -8,8 +8,9 @@ from scipy.stats import norm, poisson
 
 import lumigraph as lg
 from lumigraph.errors import GeometryError, SamplingWarning
-from lumigraph.studies.information import Light, bounds, pixel_information, trials
+from lumigraph.studies.information import Light, bounds, trials
 from lumigraph.studies.information.bounds import PointInformation, expected, fisher, reading
+from lumigraph.studies.information.noise import pixel_information
 from lumigraph.studies.information.points import source, spread
 
 UM = 1e-6

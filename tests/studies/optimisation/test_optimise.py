@@ -13,11 +13,11 @@ from lumigraph.cli import main
 from lumigraph.errors import FormatError, GeometryError, SamplingWarning
 from lumigraph.studies.information import Light
 from lumigraph.studies.information.points import collected
-from lumigraph.studies.optimisation import Goal, Optimum
+from lumigraph.studies.optimisation import Goal
 from lumigraph.studies.optimisation.front import front, trace
 from lumigraph.studies.optimisation.goals import JudgedBound
 from lumigraph.studies.optimisation.gradient import downhill
-from lumigraph.studies.optimisation.optimise import _warn_of_luck
+from lumigraph.studies.optimisation.optimise import Optimum, _warn_of_luck
 from lumigraph.studies.optimisation.search import grid, refined
 from lumigraph.studies.optimisation.space import Space
 

@@ -7,7 +7,8 @@ import pytest
 
 import lumigraph as lg
 from lumigraph.instruments import Built
-from lumigraph.studies.tolerance import ToleranceTrials, built, study
+from lumigraph.studies.tolerance import built, study
+from lumigraph.studies.tolerance.trials import ToleranceTrials
 
 TILTS = {
     "array_tilt_y": "±2 mrad", "array_tilt_x": "±2 mrad", "array_bow": "±20 um uniform",

@@ -8,12 +8,14 @@ import pytest
 import cluster_jobs as jobs
 import lumigraph as lg
 from cameras import focused
-from lumigraph.elements import Scatter, form
+from lumigraph.elements import form
+from lumigraph.elements.scatter import Scatter
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments import Tolerance
 from lumigraph.scene import Scene
-from lumigraph.studies.tolerance import ToleranceTrials, built, study
+from lumigraph.studies.tolerance import built, study
 from lumigraph.studies.tolerance.single import AxisView
+from lumigraph.studies.tolerance.trials import ToleranceTrials
 
 UM = 1e-6
 EACH = {

@@ -12,7 +12,9 @@ import lumigraph as lg
 from cameras import focused
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments import Built, Tolerance
-from lumigraph.studies.tolerance import ToleranceOutcome, ToleranceTrials, built, drawn, study
+from lumigraph.studies.tolerance import built, drawn, study
+from lumigraph.studies.tolerance.outcome import ToleranceOutcome
+from lumigraph.studies.tolerance.trials import ToleranceTrials
 
 UM = 1e-6
 SMALL = {

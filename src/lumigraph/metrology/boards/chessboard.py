@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from lumigraph.analysis import find_chart
+from lumigraph.analysis.chart import find_chart
 from lumigraph.errors import CalibrationError, LumigraphError, SamplingError
 from lumigraph.metrology.boards.corners import Board
 from lumigraph.metrology.boards.order import ordered, told_of

@@ -20,7 +20,7 @@ from lumigraph.errors import CalibrationError
 from lumigraph.metrology.boards import chessboard, rims, views, windows
 from lumigraph.metrology.boards.corners import Board, Corners
 from lumigraph.metrology.boards.spill import GREEN, Spill
-from lumigraph.preparation import of_raw
+from lumigraph.preparation.prepare import of_raw
 from lumigraph.rendering import render
 from lumigraph.rendering.interpolate import as_float
 from lumigraph.rendering.patches import Patches, PatchLayout

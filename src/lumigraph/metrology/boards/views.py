@@ -15,7 +15,8 @@ from lumigraph.errors import CalibrationError
 from lumigraph.metrology.boards import chessboard, windows
 from lumigraph.metrology.boards.corners import Board
 from lumigraph.metrology.boards.order import ordered, told_of
-from lumigraph.preparation import decode, of_raw
+from lumigraph.preparation import decode
+from lumigraph.preparation.prepare import of_raw
 from lumigraph.rendering.geometry import raw_places
 
 LEAST_VIEWS = 5

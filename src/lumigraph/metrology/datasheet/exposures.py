@@ -12,7 +12,7 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.raw import RawImage
 from lumigraph.core.short_repr import brief
 from lumigraph.errors import FormatError
-from lumigraph.preparation import read_raw
+from lumigraph.preparation.given import read_raw
 from lumigraph.sensor import Sensor
 
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from lumigraph.analysis import PupilEdge, photon_transfer, pupil_edge
+from lumigraph.analysis import photon_transfer, pupil_edge
+from lumigraph.analysis.pupil_edge import PupilEdge
 from lumigraph.calibration import calibrate
 from lumigraph.calibration.fitting import Fitted
 from lumigraph.core.arrays import to_numpy

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.stats import t as student
 
 from lumigraph import depth
-from lumigraph.analysis import Chart, find_chart
-from lumigraph.analysis.chart import LEAST_BENT
+from lumigraph.analysis import Chart
+from lumigraph.analysis.chart import LEAST_BENT, find_chart
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.depth_map import DepthMap

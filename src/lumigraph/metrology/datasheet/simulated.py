@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lumigraph.analysis import Chart, find_chart
+from lumigraph.analysis import Chart
+from lumigraph.analysis.chart import find_chart
 from lumigraph.calibration import calibrate
 from lumigraph.core import checks
 from lumigraph.core.result import Quantity

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from lumigraph.elements import GlassSurface, LensletArray
+from lumigraph.elements import LensletArray
+from lumigraph.elements.surface import GlassSurface
 from lumigraph.operators.lenslets.cell_response import CellLenslets, bent, focal_lengths, sphere
 from lumigraph.operators.sampling import cells as _cells
 from lumigraph.operators.sampling.cell_axis import MIDDLE, Accepted, Box, CellAxis, Pair

@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from lumigraph.elements import LensletArray, Scatter, form
+from lumigraph.elements import LensletArray, form
+from lumigraph.elements.scatter import Scatter
 from lumigraph.errors import GeometryError
 from lumigraph.operators.lenslets.array_libraries import NUMPY, Array, ArrayLibrary, Numbers
 from lumigraph.operators.lenslets.cell_response import focal_lengths, legendre

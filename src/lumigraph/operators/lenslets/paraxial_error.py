@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from lumigraph.elements import GlassSurface
+from lumigraph.elements.surface import GlassSurface
 from lumigraph.operators.lenslets.cell_response import bent, focal_lengths, legendre, sphere
 from lumigraph.operators.lenslets.exact_light import image_distance
 from lumigraph.operators.sampling import cells as _cells

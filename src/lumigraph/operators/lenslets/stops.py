@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import j1
 
-from lumigraph.elements import VignettedPupil
+from lumigraph.elements.field_plate import VignettedPupil
 from lumigraph.operators.sampling import cells as _cells
 from lumigraph.operators.sampling import field_lenses
 from lumigraph.operators.sampling.optics import Optics

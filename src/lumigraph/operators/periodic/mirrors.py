@@ -14,7 +14,8 @@ import numpy as np
 from lumigraph.core import arrays
 from lumigraph.core.arrays import Array
 from lumigraph.core.linear import Linear, Shape
-from lumigraph.elements import FieldPlate, ThinLens, noll_to_nm
+from lumigraph.elements import ThinLens, noll_to_nm
+from lumigraph.elements.field_plate import FieldPlate
 from lumigraph.elements.train import Element
 from lumigraph.operators.lenslets.cell_response import focal_lengths
 from lumigraph.operators.sampling.border_classes import Turn

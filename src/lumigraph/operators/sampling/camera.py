@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from lumigraph.core.lattice import Lattice
-from lumigraph.elements import GlassSurface, LensletArray, ObjectSpace, TiltAndBow, Train
+from lumigraph.elements import LensletArray, ObjectSpace, Train
+from lumigraph.elements.surface import GlassSurface
+from lumigraph.elements.tilt import TiltAndBow
 from lumigraph.sensor import Sensor
 
 Model = Literal["paraxial", "exact", "auto"]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lumigraph.sensor import AngularResponse
+from lumigraph.sensor.angular import AngularResponse
 
 SLACK = 1.04
 """How much wider than D/(λL) the band is taken: grey pixels at the stop's edge reach beyond it."""

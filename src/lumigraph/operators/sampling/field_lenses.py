@@ -18,7 +18,8 @@ import numpy as np
 
 from lumigraph.core.grid import Grid
 from lumigraph.core.linear import Chain, Linear, Sum
-from lumigraph.elements import OF_ONE_LENS, FieldPlate, ThinLens, Train
+from lumigraph.elements import ThinLens, Train
+from lumigraph.elements.field_plate import OF_ONE_LENS, FieldPlate
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.operators.sampling.camera import CameraOptics
 from lumigraph.operators.sampling.sample_weights import SampleWeights

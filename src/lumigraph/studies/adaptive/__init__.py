@@ -9,9 +9,9 @@
 - `misfit`, `worth`, `checked`: the goodness of fit; selection of terms; checks of arguments
 """
 
-from lumigraph.studies.adaptive.estimate import TERMS, estimate
-from lumigraph.studies.adaptive.sense import MODES, sense
-from lumigraph.studies.adaptive.start import ViewSlopes, start
+from lumigraph.studies.adaptive.estimate import estimate
+from lumigraph.studies.adaptive.sense import sense
+from lumigraph.studies.adaptive.start import start
 from lumigraph.studies.adaptive.wavefront import Wavefront, wavefront_map
 
 __all__ = ["MODES", "TERMS", "ViewSlopes", "Wavefront", "estimate", "sense", "start", "wavefront_map"]

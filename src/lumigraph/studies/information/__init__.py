@@ -9,10 +9,9 @@
 """
 
 from lumigraph.studies.information.bounds import Bounds, Light, bounds
-from lumigraph.studies.information.noise import pixel_information
-from lumigraph.studies.information.reconstruction import ReconstructionError, reconstruction_error
+from lumigraph.studies.information.reconstruction import reconstruction_error
 from lumigraph.studies.information.reconstruction_slopes import reconstruction_slopes
-from lumigraph.studies.information.reconstruction_trials import ReconstructionTrials, reconstruction_trials
+from lumigraph.studies.information.reconstruction_trials import reconstruction_trials
 from lumigraph.studies.information.scenes import Scenes
 from lumigraph.studies.information.slopes import slopes
 from lumigraph.studies.information.trials import Trials, trials
@@ -20,12 +19,9 @@ from lumigraph.studies.information.trials import Trials, trials
 __all__ = [
     "Bounds",
     "Light",
-    "ReconstructionError",
-    "ReconstructionTrials",
     "Scenes",
     "Trials",
     "bounds",
-    "pixel_information",
     "reconstruction_error",
     "reconstruction_slopes",
     "reconstruction_trials",

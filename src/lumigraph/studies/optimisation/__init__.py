@@ -10,8 +10,8 @@
 """
 
 from lumigraph.studies.optimisation.goals import Goal
-from lumigraph.studies.optimisation.mask import DepthMask, depth_mask
-from lumigraph.studies.optimisation.optimise import Optimum, optimise
+from lumigraph.studies.optimisation.mask import depth_mask
+from lumigraph.studies.optimisation.optimise import optimise
 
 __all__ = ["DepthMask", "Goal", "Optimum", "depth_mask", "optimise"]
 

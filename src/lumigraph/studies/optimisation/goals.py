@@ -16,7 +16,6 @@ from lumigraph.metrology.datasheet.charts import check_camera
 from lumigraph.studies.information import (
     Bounds,
     Light,
-    ReconstructionError,
     Scenes,
     bounds,
     reconstruction_error,
@@ -27,6 +26,7 @@ from lumigraph.studies.information.followed import require_followed
 from lumigraph.studies.information.imaging import check as check_scenes
 from lumigraph.studies.information.imaging import usual_scenes
 from lumigraph.studies.information.points import collected
+from lumigraph.studies.information.reconstruction import ReconstructionError
 from lumigraph.studies.information.reconstruction_slopes import require_planes
 from lumigraph.studies.information.slopes import Bound, slopes
 

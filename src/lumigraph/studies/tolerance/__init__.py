@@ -10,9 +10,7 @@
 
 from lumigraph.studies.tolerance.making import built, cameras, drawn
 from lumigraph.studies.tolerance.measures import measures
-from lumigraph.studies.tolerance.outcome import ToleranceOutcome
-from lumigraph.studies.tolerance.study import Study, study
-from lumigraph.studies.tolerance.trials import ToleranceTrials
+from lumigraph.studies.tolerance.study import study
 
 __all__ = ["Study", "ToleranceOutcome", "ToleranceTrials", "built", "cameras", "drawn", "measures", "study"]
 

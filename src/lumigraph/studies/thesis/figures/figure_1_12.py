@@ -7,7 +7,8 @@ from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.instruments import PlenopticCamera
-from lumigraph.rendering import decode, encode, lenslet_mosaic, refocus, views_from_mosaic, views_mosaic
+from lumigraph.rendering import decode, encode, refocus, views_from_mosaic
+from lumigraph.rendering.views import lenslet_mosaic, views_mosaic
 from lumigraph.scene import Scene, Slice, targets
 from lumigraph.simulation import simulate
 from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment

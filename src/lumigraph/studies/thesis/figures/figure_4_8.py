@@ -10,7 +10,7 @@ from lumigraph.calibration import calibrate, devignette
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
-from lumigraph.depth import sharpness
+from lumigraph.depth.from_focus import sharpness
 from lumigraph.instruments import PlenopticCamera
 from lumigraph.rendering import decode, reduce_aperture, refocus
 from lumigraph.scene import Scene, targets

@@ -9,7 +9,8 @@ from lumigraph import plots
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.lattice import Lattice
 from lumigraph.core.lightfield import LightField
-from lumigraph.depth import BiasCurve, point_alpha, sharpness
+from lumigraph.depth import BiasCurve
+from lumigraph.depth.from_focus import point_alpha, sharpness
 from lumigraph.design import plenoptic1
 from lumigraph.instruments import PlenopticCamera
 from lumigraph.rendering import decode, refocus, refocus_stack
