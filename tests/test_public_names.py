@@ -54,6 +54,7 @@ def test_packages_show_what_they_hand_on_and_no_helper_modules():
     packages = {name: found for name in MODULES if hasattr(found := getattr(lg, name), "__path__")}
     assert len(packages) > 20
     assert not [name for name, found in packages.items() if sorted(dir(found)) != sorted(found.__all__)]
+    assert not [(room, n) for room, found in packages.items() for n in dir(found) if not hasattr(found, n)]
 
 
 def test_old_names_say_the_new_ones():

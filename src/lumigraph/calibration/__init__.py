@@ -21,7 +21,7 @@ from lumigraph.calibration.exact import exactly
 from lumigraph.calibration.following import followed
 from lumigraph.calibration.lattice_fit import calibrate
 
-__all__ = ["Diagnosis", "aligned", "calibrate", "devignette", "diagnose", "exactly", "followed"]
+__all__ = ["aligned", "calibrate", "devignette", "diagnose", "exactly", "followed"]
 
 
 def __dir__() -> list[str]:

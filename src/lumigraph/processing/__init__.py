@@ -11,4 +11,4 @@
 
 from lumigraph.processing.process import Processed, process
 
-__all__ = ["Guess", "Processed", "process", "recognise"]
+__all__ = ["Processed", "process"]

@@ -9,7 +9,7 @@ from lumigraph.sensor.colour import demosaic, levels, mosaic
 from lumigraph.sensor.pixels import integrate
 from lumigraph.sensor.sensor import Sensor
 
-__all__ = ["AngularResponse", "Sensor", "demosaic", "integrate", "integrate_adjoint", "levels", "mosaic"]
+__all__ = ["Sensor", "demosaic", "integrate", "levels", "mosaic"]
 
 
 def __dir__() -> list[str]:

@@ -14,7 +14,7 @@ from lumigraph.studies.adaptive.sense import sense
 from lumigraph.studies.adaptive.start import start
 from lumigraph.studies.adaptive.wavefront import Wavefront, wavefront_map
 
-__all__ = ["MODES", "TERMS", "ViewSlopes", "Wavefront", "estimate", "sense", "start", "wavefront_map"]
+__all__ = ["Wavefront", "estimate", "sense", "start", "wavefront_map"]
 
 
 def __dir__() -> list[str]:

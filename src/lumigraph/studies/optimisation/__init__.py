@@ -13,7 +13,7 @@ from lumigraph.studies.optimisation.goals import Goal
 from lumigraph.studies.optimisation.mask import depth_mask
 from lumigraph.studies.optimisation.optimise import optimise
 
-__all__ = ["DepthMask", "Goal", "Optimum", "depth_mask", "optimise"]
+__all__ = ["Goal", "depth_mask", "optimise"]
 
 
 def __dir__() -> list[str]:

@@ -12,7 +12,7 @@ from lumigraph.studies.tolerance.making import built, cameras, drawn
 from lumigraph.studies.tolerance.measures import measures
 from lumigraph.studies.tolerance.study import study
 
-__all__ = ["Study", "ToleranceOutcome", "ToleranceTrials", "built", "cameras", "drawn", "measures", "study"]
+__all__ = ["built", "cameras", "drawn", "measures", "study"]
 
 
 def __dir__() -> list[str]:
