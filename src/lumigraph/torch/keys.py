@@ -127,7 +127,7 @@ def _number(camera: Camera, name: str) -> float:
     """Value under a key, in SI; 0 of a key that the file leaves out, if it counts from there."""
     here = value(camera, name)
     if here is None:
-        if not any(part in name for part in ("aberrations", "single", "built", "offset")):
+        if not any(part in name for part in ("aberrations", "single", "built", "offset", "rotation")):
             raise FormatError(f"{name} has no value in the camera file. Give it one to begin with.")
         return 0.0
     return Range.si(here)
