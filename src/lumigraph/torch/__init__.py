@@ -4,7 +4,7 @@
 - `keys`: those keys as parameters within their ranges; `expansion`, a camera's numbers as tensors
 - `library`: array functions of PyTorch, by which it runs the lines of `operators.lenslets`
 - `images`: images of points and of planes; `noise`: `Exposure`, noise by reparametrisation
-- `operator`: `Operator`, any linear operator with its exact adjoint; `physics`, the same for deepinv
+- `operator`: `Operator`, any linear operator with its exact adjoint; `for_deepinv`, the same for deepinv
 """
 
 from importlib import import_module
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from lumigraph.torch.camera import Camera
     from lumigraph.torch.noise import Exposure
     from lumigraph.torch.operator import Operator
-    from lumigraph.torch.physics import physics
+    from lumigraph.torch.for_deepinv import physics
 
 __all__ = ["Camera", "Exposure", "Operator", "physics"]
 
-_HOMES = {"Camera": "camera", "Exposure": "noise", "Operator": "operator", "physics": "physics"}
+_HOMES = {"Camera": "camera", "Exposure": "noise", "Operator": "operator", "physics": "for_deepinv"}
 
 
 def __getattr__(name: str) -> Any:
