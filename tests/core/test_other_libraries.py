@@ -64,9 +64,7 @@ def test_a_torch_operator_has_exact_slopes_twice_and_refuses_other_shapes():
     model = lg.torch.Operator(OPERATOR)
     x = torch.as_tensor(X)[None].requires_grad_()
     (slope,) = torch.autograd.grad((model(x) ** 2).sum() / 2, x, create_graph=True)
-    np.testing.assert_allclose(
-        slope[0].detach(), OPERATOR.adjoint(OPERATOR.forward(X)), rtol=1e-9
-    )
+    np.testing.assert_allclose(slope[0].detach(), OPERATOR.adjoint(OPERATOR.forward(X)), rtol=1e-9)
     (curve,) = torch.autograd.grad((slope**2).sum() / 2, x)  # (A'A)² x
     again = OPERATOR.adjoint(OPERATOR.forward(slope[0].detach().numpy()))
     np.testing.assert_allclose(curve[0], again, rtol=1e-6)

@@ -78,5 +78,5 @@ def test_slopes_by_fourteen_keys_are_those_of_central_differences():
     model = lg.torch.Camera(SMALL, KEYS)
     assert len(model.names) == 14
     found, known = slopes(model, POINTS), differences(model, POINTS, range(14), 2e-3)
-    print(found/known-1)
+    print(found / known - 1)
     np.testing.assert_allclose(found, known, rtol=1e-4)

@@ -1,17 +1,31 @@
 """Linear maps in the words of other libraries: SciPy's and PyLops' operators."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from lumigraph.errors import LumigraphError
 
-if TYPE_CHECKING:
-    from lumigraph.core.linear import Linear
+
+class Map(Protocol):
+    """What `Linear` is."""
+
+    @property
+    def shape(self) -> Any:
+        """Shapes of a raw image and of an object."""
+        ...
+
+    def forward(self, intensity: Any, /) -> Any:
+        """Raw image of an object."""
+        ...
+
+    def adjoint(self, raw: Any, /) -> Any:
+        """The transpose."""
+        ...
 
 
-def to_scipy(operator: "Linear", dtype: Any = np.float32) -> Any:
+def to_scipy(operator: Map, dtype: Any = np.float32) -> Any:
     """The map as `scipy.sparse.linalg.LinearOperator`; see `Linear.to_scipy`."""
     from scipy.sparse.linalg import LinearOperator
 
@@ -20,7 +34,7 @@ def to_scipy(operator: "Linear", dtype: Any = np.float32) -> Any:
     return LinearOperator(shape, matvec=there, rmatvec=back, dtype=np.dtype(dtype))
 
 
-def to_pylops(operator: "Linear", dtype: Any = np.float32) -> Any:
+def to_pylops(operator: Map, dtype: Any = np.float32) -> Any:
     """The map as `pylops.LinearOperator`; see `Linear.to_pylops`."""
     try:
         from pylops import LinearOperator
@@ -43,7 +57,7 @@ def to_pylops(operator: "Linear", dtype: Any = np.float32) -> Any:
     return Foreign(dtype=np.dtype(dtype), dims=given, dimsd=raw, name="lumigraph")
 
 
-def _flat(operator: "Linear", dtype: Any) -> tuple[Any, Any]:
+def _flat(operator: Map, dtype: Any) -> tuple[Any, Any]:
     """The map and its transpose, of vectors."""
     raw, given = operator.shape
 

@@ -36,7 +36,8 @@ class Camera(torch.nn.Module):
         Keys of the camera file, as `lumigraph optimise --vary` has them, that are parameters: a mapping to
         their ranges, such as ``{"lenslets.focal_length": "5 mm:5.4 mm"}``, or names alone for 5 % to either
         side of the camera's own value. They are `parts`, 0 at the low end of the range and 1 at the high
-        one, and are put back onto the range where an optimiser leaves it.
+        one, and are put back onto the range where an optimiser leaves it. "main_lens.mask.phase" and
+        "main_lens.mask.open", tables of control points, are `mask`, as the file has them.
     grid
         Samples of scenes; `camera.operator_grid()` if left out.
     depths
@@ -82,6 +83,8 @@ class Camera(torch.nn.Module):
         checks.instance("camera", start, Described)
         self.keys = Keys.of(start, parameters)
         self.parts = torch.nn.Parameter(torch.as_tensor(self.keys.own, dtype=torch.float64))
+        points = {name: torch.as_tensor(table) for name, table in self.keys.points().items()}
+        self.mask = torch.nn.ParameterDict(points)
         self.grid, self.depths, self.accuracy = grid, [float(dz) for dz in depths], accuracy
         self.exposure = None if photons is None else Exposure(start.sensor, photons)
         for dz in self.depths:
@@ -95,15 +98,13 @@ class Camera(torch.nn.Module):
     @property
     def camera(self) -> Described:
         """The camera as it is now: ``model.camera.to_toml()`` is its file."""
-        return self.keys.at(self._values(), pairs=False)[0]
+        return self.keys.at(self._values(), self._masks(), pairs=False)[0]
 
     def values(self) -> dict[str, Any]:
         """Values of the keys, as a camera file has them."""
         return self.keys.item(self._values())
 
-    def forward(
-        self, scene: torch.Tensor | Points, generator: torch.Generator | None = None
-    ) -> torch.Tensor:
+    def forward(self, scene: torch.Tensor | Points, generator: torch.Generator | None = None) -> torch.Tensor:
         """Raw images (batch, ny, nx).
 
         Parameters
@@ -154,10 +155,18 @@ class Camera(torch.nn.Module):
 
     def _images(self) -> PointImages:
         wanted = torch.is_grad_enabled() and self.parts.requires_grad
-        return self.keys.images(self._values(), self.accuracy, pairs=wanted)
+        return self.keys.images(self._values(), self._masks(), self.accuracy, pairs=wanted)
 
     def _expand(self, own: SampledCamera, ends: Sequence[Both]) -> Expansion:
-        return Expansion(own, ends, self.parts.double(), self.keys.widths(self._values()))
+        moves = {name: points.double() - points.detach().double() for name, points in self.mask.items()}
+        return Expansion(own, ends, self.parts.double(), self.keys.widths(self._values()), moves)
+
+    def _masks(self) -> dict[str, np.ndarray]:
+        """Control points of the masks; openings are put back onto 0 to 1."""
+        with torch.no_grad():
+            if "open" in self.mask:
+                self.mask["open"].clamp_(0, 1)
+        return {name: one.detach().double().cpu().numpy() for name, one in self.mask.items()}
 
     def _values(self) -> np.ndarray:
         with torch.no_grad():

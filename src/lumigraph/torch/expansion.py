@@ -1,12 +1,14 @@
 """A camera's numbers as tensors: their values, and to first order how they change with its keys."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import torch
 
+from lumigraph.elements import PupilMask
 from lumigraph.errors import GeometryError
+from lumigraph.operators.lenslets import main_lens
 from lumigraph.operators.lenslets.gradient import Both, Moved, both
 from lumigraph.operators.lenslets.sampled_camera import SampledCamera, SourcePoint
 
@@ -55,11 +57,19 @@ class Expansion:
         (n,), of the keys' ranges.
     widths
         (n,), how far apart the cameras of the pairs are.
+    masks
+        Zeros (n, n) that change as the control points of the stop's mask do: "phase", "open".
     """
 
     def __init__(
-        self, own: SampledCamera, ends: Sequence[Both], parts: torch.Tensor, widths: np.ndarray
+        self,
+        own: SampledCamera,
+        ends: Sequence[Both],
+        parts: torch.Tensor,
+        widths: np.ndarray,
+        masks: Mapping[str, torch.Tensor],
     ) -> None:
+        self.masks = masks
         self.own, self.ends, self.widths = own, ends, widths
         self.device = parts.device
         self.moves = first_order(parts) if ends else None
@@ -81,10 +91,25 @@ class Expansion:
             [end.numbers(one) for end, one in both(source, ends, where)]
             for ends, where in zip(self.ends, moved, strict=True)
         ]
-        return {
+        found = {
             name: self.tensor(one, ((k, low[name], high[name]) for k, (low, high) in enumerate(seen)))
             for name, one in own.items()
         }
+        return found | self._masked(found) if self.masks else found
+
+    def _masked(self, numbers: Numbers) -> Numbers:
+        """The stop and the phase in it, which are linear in the mask's control points."""
+        lens, grid, found = self.own.optics.camera.lens, self.own.grid, {}
+        (mask,) = (part for part in lens.elements if isinstance(part, PupilMask))
+        for name, moves in self.masks.items():
+            y, x = (torch.as_tensor(mask.basis(at, len(moves))) for at in (grid.y, grid.x))
+            change = y.to(moves.device) @ moves @ x.to(moves.device).T
+            if name == "phase":
+                found["aberrations"] = numbers["aberrations"] + 2 * np.pi * change
+            else:
+                stop = torch.as_tensor(main_lens.opening_of(lens).through(grid), device=moves.device)
+                found["stop"] = numbers["stop"] + stop * change
+        return found
 
     def of_lenslets(self, keys: Iterable[Any]) -> Numbers:
         """Numbers that the lenslets' arrays follow from."""

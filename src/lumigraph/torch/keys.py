@@ -20,6 +20,9 @@ APART = 1e-4
 AROUND = 0.05
 """Half of the range of a key that has none, over its value."""
 
+MASKS = {"main_lens.mask.phase": "phase", "main_lens.mask.open": "open"}
+"""Tables of control points that are parameters as a whole."""
+
 Pair = tuple[CameraOptics, CameraOptics]
 
 
@@ -33,10 +36,13 @@ class Keys:
         The camera.
     ranges
         By key.
+    masks
+        Keys of `MASKS` that are parameters, too.
     """
 
     camera: Camera
     ranges: Mapping[str, Range]
+    masks: Sequence[str] = ()
     _known: dict[bytes, tuple[Camera, list[Pair]]] = field(default_factory=dict)
 
     @classmethod
@@ -49,7 +55,14 @@ class Keys:
             An unknown key, no range, or a value that lies out of it; a key without a value to begin with.
         """
         words = parameters if isinstance(parameters, Mapping) else dict.fromkeys(parameters, "")
-        found = cls(camera, {name: _range(camera, name, text) for name, text in words.items()})
+        ranges = {name: _range(camera, name, text) for name, text in words.items() if name not in MASKS}
+        found = cls(camera, ranges, [name for name in words if name in MASKS])
+        for name in found.masks:
+            if value(camera, name) is None:
+                raise FormatError(
+                    f"{name} has no control points in the camera file. Give some to begin with: "
+                    'camera.replace(main_lens={"mask": {"phase": np.zeros((8, 8)).tolist()}}).'
+                )
         changed(camera, found.item(found.own))  # refuses unknown keys
         return found
 
@@ -85,18 +98,30 @@ class Keys:
             for name, number in numbers.items()
         }
 
-    def at(self, parts: np.ndarray, *, pairs: bool) -> tuple[Camera, list[Pair]]:
+    def points(self) -> dict[str, np.ndarray]:
+        """Control points of the camera's own masks, by their names in `MASKS`."""
+        return {MASKS[name]: np.array(value(self.camera, name), np.float64) for name in self.masks}
+
+    def at(
+        self, parts: np.ndarray, masks: Mapping[str, np.ndarray], *, pairs: bool
+    ) -> tuple[Camera, list[Pair]]:
         """The camera at parts of the ranges, and pairs a little to either side, 1 apart by `widths`."""
-        if (key := parts.tobytes() + bytes([pairs])) not in self._known:
+        tables = {name: masks[MASKS[name]] for name in self.masks}
+        key = b"".join(one.tobytes() for one in (parts, *tables.values())) + bytes([pairs])
+        if key not in self._known:
             self._known.clear()
-            camera = changed(self.camera, self.item(parts)) if self.ranges else self.camera
+            more = {name: table.tolist() for name, table in tables.items()}
+            camera = changed(self.camera, more) if more else self.camera
+            camera = changed(camera, self.item(parts)) if self.ranges else camera
             ends = [self._ends(camera, parts, k) for k in range(len(parts))] if pairs else []
             self._known[key] = camera, ends  # type: ignore[assignment]  # a camera stays one
         return self._known[key]
 
-    def images(self, parts: np.ndarray, accuracy: float, *, pairs: bool) -> PointImages:
+    def images(
+        self, parts: np.ndarray, masks: Mapping[str, np.ndarray], accuracy: float, *, pairs: bool
+    ) -> PointImages:
         """Images of points by the camera there, and by the pairs."""
-        camera, ends = self.at(parts, pairs=pairs)
+        camera, ends = self.at(parts, masks, pairs=pairs)
         own = resolved(camera.optics(), accuracy)
         both = tuple((replace(a, model=own.model), replace(b, model=own.model)) for a, b in ends)
         if own.lean is not None:
@@ -116,7 +141,7 @@ class Keys:
         for side in (-APART, APART):
             there = parts.copy()
             there[number] = min(max(there[number] + side, 0.0), 1.0)
-            one = changed(self.camera, self.item(there))
+            one = changed(camera, self.item(there))
             if one.sensor.shape != camera.sensor.shape:  # it follows from the lengths where it is left out
                 one = one.replace(sensor={"shape": camera.sensor.shape})
             ends.append(one.optics())  # type: ignore[attr-defined]  # a camera stays one
