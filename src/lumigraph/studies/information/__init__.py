@@ -5,6 +5,7 @@
 - `points`: images of points and their derivatives by place, of any instrument
 - `reconstruction`: `reconstruction_error`, what the best linear reconstruction of `Scenes` leaves
 - `reconstruction_slopes`, `reconstruction_trials`: its derivatives; errors of drawn scenes
+- `unknown_depth`: `unknown_depth`, the best linear rule for scenes whose depth is not known
 - `trials`: `trials`, errors of the most likely places in drawn noise, to compare with the bounds
 """
 
@@ -16,6 +17,7 @@ from lumigraph.studies.information.reconstruction_trials import ReconstructionTr
 from lumigraph.studies.information.scenes import Scenes
 from lumigraph.studies.information.slopes import slopes
 from lumigraph.studies.information.trials import Trials, trials
+from lumigraph.studies.information.unknown_depth import TrainedRule, unknown_depth, unknown_depth_trials
 
 __all__ = [
     "Bounds",
@@ -23,6 +25,7 @@ __all__ = [
     "ReconstructionError",
     "ReconstructionTrials",
     "Scenes",
+    "TrainedRule",
     "Trials",
     "bounds",
     "pixel_information",
@@ -31,6 +34,8 @@ __all__ = [
     "reconstruction_trials",
     "slopes",
     "trials",
+    "unknown_depth",
+    "unknown_depth_trials",
 ]
 
 
