@@ -22,6 +22,7 @@ from . import (
     simulation as simulation,
     studies as studies,
     testing as testing,
+    torch as torch,
     units as units,
     viewer as viewer,
 )

@@ -33,7 +33,8 @@ class GoalOptions:
     goal
         depth, lateral or brightness: bounds of a point's errors over --depth. picture error: what the best
         linear reconstruction of scenes leaves, at each of --depth; volume error: the same with scenes at all
-        depths at once. Or 'largest' or 'least' and a
+        depths at once; reconstruction: the same at one of --depth that is not known, by one linear rule that
+        is trained with each camera. Or 'largest' or 'least' and a
         number's name: light caught, one that 'lumigraph design' prints, or a simulated one of 'lumigraph
         sweep', such as 'largest mtf@10/mm', the least over --depth.
     against
@@ -95,8 +96,8 @@ class GoalOptions:
         )
         if usual is None and asked:
             raise FormatError(
-                f"--scenes, --scene-pitch and --scene-samples are for the goals 'picture error' and 'volume "
-                f"error', not {self.goal!r}."
+                f"--scenes, --scene-pitch and --scene-samples are for the goals 'picture error', 'volume "
+                f"error' and 'reconstruction', not {self.goal!r}."
             )
         if usual is None:
             return None

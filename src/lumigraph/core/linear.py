@@ -4,7 +4,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -119,6 +119,37 @@ class Linear(ABC):
     def error(self) -> float:
         """Estimated relative rms error of a raw image; 0 for what is exact but for rounding."""
         return 0.0
+
+    def to_scipy(self, dtype: Any = np.float32) -> Any:
+        """The map as `scipy.sparse.linalg.LinearOperator`, of objects and raw images as vectors (C order).
+
+        Parameters
+        ----------
+        dtype
+            Precision that vectors are cast to.
+
+        Examples
+        --------
+        >>> import lumigraph as lg
+        >>> camera = lg.load_camera("thesis-2f").replace(sensor={"shape": (32, 32)})
+        >>> camera.operator().to_scipy().shape[0]
+        1024
+        """
+        from lumigraph.core.other_libraries import to_scipy
+
+        return to_scipy(self, dtype)
+
+    def to_pylops(self, dtype: Any = np.float32) -> Any:
+        """The map as `pylops.LinearOperator`, of vectors or of arrays of its `dims` and `dimsd`.
+
+        Raises
+        ------
+        LumigraphError
+            PyLops is not installed.
+        """
+        from lumigraph.core.other_libraries import to_pylops
+
+        return to_pylops(self, dtype)
 
     @property
     def T(self) -> "Linear":

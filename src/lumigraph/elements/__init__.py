@@ -9,6 +9,7 @@
 - `surface`: `GlassSurface`, the curved side of lenslets of glass
 - `lean`: `TiltAndBow`, tilt and bow of arrays and sensors
 - `zernike`: Zernike polynomials in Noll's order and `ZernikePlate`
+- `pupil_mask`: `PupilMask`, phase masks, coded apertures and diffusers in the stop
 - `field_plate`: Zernike terms that change over the field, and their plate
 - `objective`: `Objective`, a microscope's, for points before it; `disc`, nodes of its pupil
 - `masks`: white random phases and the thesis' random phase mask
@@ -19,6 +20,7 @@ from lumigraph.elements.lens import ThinLens
 from lumigraph.elements.lenslets import LensletArray
 from lumigraph.elements.masks import random_phase_mask, white_phase
 from lumigraph.elements.object_space import ObjectSpace
+from lumigraph.elements.pupil_mask import PupilMask
 from lumigraph.elements.train import Element, Train
 from lumigraph.elements.zernike import ZernikePlate, noll_to_nm, zernike
 
@@ -27,6 +29,7 @@ __all__ = [
     "Element",
     "LensletArray",
     "ObjectSpace",
+    "PupilMask",
     "RectangularAperture",
     "ThinLens",
     "Train",

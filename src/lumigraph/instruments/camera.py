@@ -183,11 +183,12 @@ class Camera(Instrument):
         if self.main_lens.over_field is not None:
             plate = FieldPlate(self.main_lens.over_field.aberrations, diameter, tuple(waves.items()))
             return Train((plate, ThinLens(focal_length)))
+        masks = () if self.main_lens.mask is None else (self.main_lens.mask.element(diameter),)
         if not waves:
-            return Train((ThinLens(focal_length, diameter),))
+            return Train((*masks, ThinLens(focal_length, diameter)))
         # The plate is also the stop: two grey edges would be darker than one.
         plate = ZernikePlate({j: 2 * math.pi * rms for j, rms in waves.items()}, diameter)
-        return Train((plate, ThinLens(focal_length)))
+        return Train((plate, *masks, ThinLens(focal_length)))
 
     @cached_property
     def glass(self) -> LensGlass | None:

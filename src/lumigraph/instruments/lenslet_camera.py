@@ -266,6 +266,11 @@ class LensletCamera(CameraGradients):
                 'model is "exact" but the main lens changes over the field, which only the paraxial model '
                 'follows. Use model = "paraxial" or "auto", or leave over_field and prescription out.'
             )
+        if self.model == "exact" and self.main_lens.mask is not None:
+            raise GeometryError(
+                'model is "exact" but the main lens has a mask, which only the paraxial model follows. '
+                'Use model = "paraxial", or leave main_lens.mask out.'
+            )
         if self.model == "exact" and not is_possible(plain):
             raise GeometryError(
                 f'model is "exact" but the lenslets are {self.lenslets.shape or self.lenslets.layout}, of '

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments.angular import Angles
+from lumigraph.instruments.mask import Mask
 from lumigraph.instruments.over_field import OverField, given
 from lumigraph.instruments.part import CameraTable
 from lumigraph.instruments.quantities import (
@@ -45,6 +46,8 @@ class MainLens(CameraTable):
         Terms that change over the field besides: `OverField`, its table, or the path of a CSV file.
     prescription
         Path of a ZMX file or of Optiland's JSON, in place of terms, which follow from its rays.
+    mask
+        Phase mask, coded aperture or diffuser in the stop: `Mask` or its table.
 
     Examples
     --------
@@ -57,6 +60,7 @@ class MainLens(CameraTable):
     aberrations: Aberrations = Field(default_factory=dict)
     over_field: Annotated[OverField | None, BeforeValidator(given)] = None
     prescription: File | None = None
+    mask: Mask | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -72,6 +76,8 @@ class MainLens(CameraTable):
     def _has_one_source(self) -> "MainLens":
         if self.over_field is not None and self.prescription is not None:
             raise FormatError("over_field and prescription both give terms over the field. Leave one out.")
+        if self.mask is not None and self.varies:
+            raise FormatError("mask stands in a lens that changes over the field. Leave one of them out.")
         return self
 
     @property

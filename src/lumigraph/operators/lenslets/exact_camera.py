@@ -41,7 +41,7 @@ class ExactSampledCamera(SampledCamera):
 
     def light(self, xp: ArrayLibrary, numbers: Numbers, source: SourcePoint) -> Array:
         """Light (y, x) of a point in the lenslet plane, without the sphere around the stop's middle."""
-        phase, strength, bends, smooth = self._stop(source)
+        phase, strength, bends, smooth = map(xp.asarray, self._stop(source))
         to = self._smooth
         change = xp.asarray(to) @ (numbers["smooth"] - smooth) @ xp.asarray(to.T)
         stop = numbers["edge"] * xp.exp((strength + change[1]) + 1j * (phase + change[0]))

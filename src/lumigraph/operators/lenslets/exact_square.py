@@ -102,10 +102,12 @@ class CellSurroundings:
         found = 0.0
         for k in there:
             one, turn, beside = self._light(k)
-            phase, more = (by.phase[k] - own.phase[k]) + 0j, by.beside[k] - own.beside[k]
+            turn, beside, plain = xp.asarray(turn), xp.asarray(beside), xp.asarray(one.weight)
+            phase = (by.phase[k] - xp.asarray(own.phase[k])) + 0j
+            more = by.beside[k] - xp.asarray(own.beside[k])
             turn = turn * xp.exp(1j * (down @ phase @ across.T))
             wider = xp.asarray(np.concatenate([np.zeros(len(one.weight) - 2), one.edge]))
-            weight = one.weight + (by.half - own.half) * wider
+            weight = plain + (by.half - xp.asarray(own.half)) * wider
             found = found + ((beside + down @ more @ across.T) * (turn * weight)) @ xp.asarray(one.light + 0j)
         return found @ xp.asarray(self.lenslets.coefficients[self.which] + 0j)
 

@@ -20,7 +20,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import j0, j1
 
 from lumigraph.core.grid import Grid
-from lumigraph.elements import CircularAperture, Element, ThinLens, Train, ZernikePlate
+from lumigraph.elements import CircularAperture, Element, PupilMask, ThinLens, Train, ZernikePlate
 from lumigraph.errors import GeometryError
 from lumigraph.operators.lenslets.array_libraries import Array, ArrayLibrary, Numbers
 from lumigraph.operators.lenslets.cell_response import legendre
@@ -117,6 +117,8 @@ def _opening(part: Element) -> Opening | None:
         return Opening(part.diameter / 2, part.center, part.axes, part.direction)
     if isinstance(part, CircularAperture) and not part.obstruction:
         return Opening(part.diameter / 2, part.center)
+    if isinstance(part, PupilMask):
+        return None
     if isinstance(part, ThinLens):
         return None if part.diameter is None else Opening(part.diameter / 2, part.center)
     raise GeometryError(
@@ -129,7 +131,7 @@ def _phase(
     wavelength: float, separation: float, lens: Train, distance: float, y: np.ndarray, x: np.ndarray
 ) -> np.ndarray:
     """Phase of a point's wave behind the main lens [rad], over one that converges in the lenslet plane."""
-    plates = [part for part in lens.elements if isinstance(part, ZernikePlate)]
+    plates = [part for part in lens.elements if isinstance(part, ZernikePlate | PupilMask)]
     found = sum((part.phase(y, x) for part in plates), np.zeros(()))
     return found + _bend(wavelength, separation, lens, distance) * (np.square(y) + np.square(x))
 
@@ -194,8 +196,12 @@ def wave_numbers(camera: CameraOptics, lens: Train, distance: float, grid: Grid)
     bend = _bend(camera.wavelength, camera.separation, lens, distance) * grid.pitch[0] ** 2
     plates = [part for part in lens.elements if isinstance(part, ZernikePlate)]
     parts = [_over_grid(plate, grid) for plate in plates]
-    aberrations = sum(parts[1:], parts[0]) if parts else _none(grid.shape[0])
     stop = opening_of(lens).through(grid)
+    for mask in (part for part in lens.elements if isinstance(part, PupilMask)):
+        y, x = grid.y[:, None], grid.x
+        parts.append(mask.phase(y, x))
+        stop = stop * mask.amplitude(y, x)
+    aberrations = sum(parts[1:], parts[0]) if parts else _none(grid.shape[0])
     return {"strength": light, "stop": stop, "aberrations": aberrations, "defocus": bend}
 
 

@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from lumigraph.elements import PupilMask
 from lumigraph.elements.surface import GlassSurface
 from lumigraph.operators.lenslets.cell_response import bent, focal_lengths, legendre, sphere
 from lumigraph.operators.lenslets.exact_light import image_distance
@@ -84,9 +85,9 @@ def resolved(camera: CameraOptics, accuracy: float) -> CameraOptics:
 
 
 def is_possible(camera: CameraOptics) -> bool:
-    """True if lenslets can be exact: square, of one focal length, or none; behind one lens for all fields."""
+    """True if lenslets can be exact: square, of one focal length, or none; behind one bare lens."""
     array = camera.array
-    if plate_of(camera) is not None:
+    if plate_of(camera) is not None or any(isinstance(part, PupilMask) for part in camera.lens.elements):
         return False
     return array is None or (array.shape == "square" and len(focal_lengths(array)) == 1)
 

@@ -187,11 +187,16 @@ class CellImages(RepeatedImages):
     @classmethod
     def of(cls, own: SampledCamera, sources: list[SourcePoint], margin: tuple[int, int]) -> "CellImages":
         """Images of points with others around the array, so many cells on all sides."""
+        found = cls.around(own, sources, margin)
+        return found._with([one.intensity * squared(own.own_field(one)[0]) for one in sources])
+
+    @classmethod
+    def around(cls, own: SampledCamera, sources: list[SourcePoint], margin: tuple[int, int]) -> "CellImages":
+        """The same without the images: where these are."""
         numbers = slice(sources[0].number, sources[-1].number + 1)
         places = zip(margin, middle_of(own), _lit(sources), strict=True)
         y, x = (more + middle - lit.start for more, middle, lit in places)
-        found = cls(np.zeros(()), numbers, (y, x), own, sources)
-        return found._with([one.intensity * squared(own.own_field(one)[0]) for one in sources])
+        return cls(np.zeros(()), numbers, (y, x), own, sources)
 
     def changed(self, by: Tangent) -> "CellImages":
         """Change of the images."""

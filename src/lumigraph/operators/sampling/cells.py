@@ -11,7 +11,15 @@ import numpy as np
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.core.lattice import Lattice
-from lumigraph.elements import CircularAperture, LensletArray, ThinLens, Train, ZernikePlate, noll_to_nm
+from lumigraph.elements import (
+    CircularAperture,
+    LensletArray,
+    PupilMask,
+    ThinLens,
+    Train,
+    ZernikePlate,
+    noll_to_nm,
+)
 from lumigraph.elements.lens import lens_phase
 from lumigraph.elements.train import Element
 from lumigraph.elements.transmission import Thin, transmit
@@ -373,7 +381,7 @@ def stop_reach(lens: Train) -> float:
 
 def stop_area(lens: Train) -> float:
     """Area of a lens' stop, over that of the camera's round one."""
-    return math.prod(p.area for p in lens.elements if isinstance(p, ZernikePlate))
+    return math.prod(p.area for p in lens.elements if isinstance(p, ZernikePlate | PupilMask))
 
 
 def _even(j: int, coefficient: float) -> bool:
@@ -393,7 +401,7 @@ def blur(camera: CameraOptics, distance: float) -> float:
     elements = camera.lens.elements
     (focal_length,) = (p.focal_length for p in elements if isinstance(p, ThinLens))
     spread = 1 - camera.separation * (1 / focal_length - 1 / distance)
-    plates = [p for p in elements if isinstance(p, ZernikePlate)]
+    plates = [p for p in elements if isinstance(p, ZernikePlate | PupilMask)]
     if not plates:
         return camera.pupil_diameter / 2 * abs(spread)
     angle = np.arange(64)[:, None] * (math.pi / 32)

@@ -5,6 +5,7 @@
 - `points`: images of points and their derivatives by place, of any instrument
 - `reconstruction`: `reconstruction_error`, what the best linear reconstruction of `Scenes` leaves
 - `reconstruction_slopes`, `reconstruction_trials`: its derivatives; errors of drawn scenes
+- `unknown_depth`: `unknown_depth`, the best linear rule for scenes whose depth is not known
 - `trials`: `trials`, errors of the most likely places in drawn noise, to compare with the bounds
 """
 
@@ -15,11 +16,13 @@ from lumigraph.studies.information.reconstruction_trials import reconstruction_t
 from lumigraph.studies.information.scenes import Scenes
 from lumigraph.studies.information.slopes import slopes
 from lumigraph.studies.information.trials import Trials, trials
+from lumigraph.studies.information.unknown_depth import TrainedRule, unknown_depth, unknown_depth_trials
 
 __all__ = [
     "Bounds",
     "Light",
     "Scenes",
+    "TrainedRule",
     "Trials",
     "bounds",
     "reconstruction_error",
@@ -27,6 +30,8 @@ __all__ = [
     "reconstruction_trials",
     "slopes",
     "trials",
+    "unknown_depth",
+    "unknown_depth_trials",
 ]
 
 

@@ -254,6 +254,8 @@ def _reached(camera: Camera, depths: np.ndarray, width: float) -> float:
         focus = 1 / camera.main_lens.focal_length - 1 / distance
         blur = diameter * abs(1 - camera.separation * focus)
         waves = 2.44 + 12 * sum(map(abs, camera.main_lens.aberrations.values()))
+        if camera.main_lens.mask is not None:
+            waves += 2 * camera.main_lens.mask.element(diameter).steepest
         edge = 2 * waves * camera.wavelength * camera.separation / diameter
         farthest = max(farthest, blur + edge + width * camera.separation / distance)
     return farthest

@@ -87,11 +87,11 @@ def reconstruction_trials(
     light = Light() if light is None else light
     planes = checked_depths(depths)
     some, errors = [planes] if volume else list(planes[:, None]), []
-    given, begun = _given(draws, scenes), []
+    given, begun = given_scenes(draws, scenes), []
     for group in some:
         seen = imaging(instrument, group, scenes, light, accuracy)
         found = [_trial(seen, scene, reading(instrument.sensor), rng)
-                 for scene in _each(given, scenes, len(group), rng)]  # fmt: skip
+                 for scene in each_scene(given, scenes, len(group), rng)]  # fmt: skip
         off = [seen_as - scene for scene, _, seen_as in found]
         errors.append(np.array([one.std(axis=(1, 2)) for one in off]) / scenes.contrast)
         begun.append(found[0])
@@ -101,7 +101,8 @@ def reconstruction_trials(
     )  # fmt: skip
 
 
-def _given(draws: int | Sequence[Any], scenes: Scenes) -> int | list[np.ndarray]:
+def given_scenes(draws: int | Sequence[Any], scenes: Scenes) -> int | list[np.ndarray]:
+    """Scenes over their mean, or how many are drawn; others are refused."""
     if isinstance(draws, int):
         if checks.whole("draws", draws) > MOST:
             raise GeometryError(f"draws are {draws} but must be at most {MOST}.")
@@ -118,7 +119,7 @@ def _given(draws: int | Sequence[Any], scenes: Scenes) -> int | list[np.ndarray]
     return [one / one.mean() for one in found]
 
 
-def _each(
+def each_scene(
     given: int | list[np.ndarray], scenes: Scenes, planes: int, rng: np.random.Generator
 ) -> Iterator[np.ndarray]:
     """Scenes (nz, n, n)."""

@@ -17,9 +17,11 @@ from lumigraph.studies.information import (
     Bounds,
     Light,
     Scenes,
+    TrainedRule,
     bounds,
     reconstruction_error,
     reconstruction_slopes,
+    unknown_depth,
 )
 from lumigraph.studies.information.bounds import checked_depths, checked_places
 from lumigraph.studies.information.followed import require_followed
@@ -33,8 +35,8 @@ from lumigraph.studies.information.slopes import Bound, slopes
 BOUNDS = {"depth": "m", "lateral": "m", "brightness": "1"}
 """Bounds of a point over the volume, and their units."""
 
-ERRORS = ("picture error", "volume error")
-"""Expected errors of reconstructed scenes: at each depth alone, and at all depths at once."""
+ERRORS = ("picture error", "volume error", "reconstruction")
+"""Expected errors of reconstructed scenes: at each depth alone, at all depths at once, at an unknown one."""
 
 UNCERTAIN = "uncertain"
 
@@ -79,8 +81,9 @@ class Goal:
     ----------
     name
         "depth", "lateral" or "brightness", bounds of a point over the depths; "picture error" or "volume
-        error", expected errors of reconstructed scenes, at each depth alone or at all at once; or "light
-        caught", a number that the camera's description prints, or one that
+        error", expected errors of reconstructed scenes, at each depth alone or at all at once;
+        "reconstruction", the same by one linear rule that is trained together with the camera, for scenes
+        whose depth it does not know; or "light caught", a number that the camera's description prints, or one that
         `lumigraph.metrology.datasheet.simulated` measures, such as "mtf@10/mm".
     largest
         Whether large is good.
@@ -234,6 +237,8 @@ class Goal:
         GeometryError
             No bound and no error of scenes, or an instrument without derivatives of them.
         """
+        if self.name == ERRORS[2]:
+            raise GeometryError(f"search 'gradient' is not for {self.name!r}. Use 'local' or 'global'.")
         if self.name in ERRORS:
             require_planes(instrument)
             return
@@ -260,7 +265,7 @@ class Goal:
             between = math.nan
             if self.name == ERRORS[0] and len(halves := self._halves()):  # a volume of others is another
                 between = replace(self, depths=halves).reconstructions(instrument, first).value
-            return JudgedBound(found.value, found.uncertain, found.errors, between)
+            return JudgedBound(found.value, getattr(found, "uncertain", 0.0), found.errors, between)
         light, used = self.light_of(instrument, first), int(rough[PLACES])
         others = range(used, used + max(used, OTHERS))
         found = bounds(instrument, self.depths, light, places=others)
@@ -280,8 +285,12 @@ class Goal:
         depths = np.unique(self.depths)
         return tuple(float(dz) for dz in (depths[1:] + depths[:-1]) / 2)
 
-    def reconstructions(self, instrument: Instrument, first: float) -> ReconstructionError:
+    def reconstructions(self, instrument: Instrument, first: float) -> ReconstructionError | TrainedRule:
         """Expected errors of reconstructed scenes, by an instrument; `first` as of `values`."""
+        if self.name == ERRORS[2]:
+            return unknown_depth(
+                instrument, self.depths, self.judged_scenes, self.light_of(instrument, first)
+            )
         return reconstruction_error(
             instrument,
             self.depths,
@@ -308,7 +317,8 @@ class Goal:
             warnings.simplefilter("error", SamplingWarning)
             found = self.reconstructions(instrument, first)
         light = self.light_of(instrument, first)
-        return {self.name: found.value, UNCERTAIN: found.uncertain, "photons": light.photons}
+        uncertain = getattr(found, UNCERTAIN, 0.0)  # of a rule in closed form
+        return {self.name: found.value, UNCERTAIN: uncertain, "photons": light.photons}
 
     def light_of(self, instrument: Instrument, first: float) -> Light:
         """Light that an instrument collects by its aperture; `first` as of `values`."""

@@ -45,6 +45,15 @@ class Range:
         part = (number - self.low) / (self.high - self.low)
         return self.at(part) if -ROUNDED <= part <= 1 + ROUNDED else None
 
+    def in_units(self, number: float) -> float:
+        """A number in the unit of the range, in SI."""
+        return number * _number(f"1 {self.unit}") if self.unit else number
+
+    @staticmethod
+    def si(value: Any) -> float:
+        """Number of a value in SI, or without a unit; NaN for a word."""
+        return _number(value)
+
     def part(self, value: Any) -> float:
         """Relative place of a value in the range, 0 to 1."""
         found = NUMBER.fullmatch(str(value))

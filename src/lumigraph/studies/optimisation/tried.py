@@ -10,7 +10,7 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.errors import GeometryError, LumigraphError
 from lumigraph.instruments.instrument import Instrument
-from lumigraph.studies.information import reconstruction_trials, trials
+from lumigraph.studies.information import reconstruction_trials, trials, unknown_depth_trials
 from lumigraph.studies.information.bounds import PARTS, checked_depths
 from lumigraph.studies.information.points import source, spread
 from lumigraph.studies.optimisation.goals import BOUNDS, ERRORS, Goal
@@ -138,10 +138,13 @@ def _scenes(
     goal: Goal, camera: Instrument, first: float, draws: int | Sequence[np.ndarray], seed: int
 ) -> DrawnErrors:
     expected, light = goal.reconstructions(camera, first), goal.light_of(camera, first)
-    found = reconstruction_trials(
-        camera, goal.depths, goal.judged_scenes, light,
-        draws=draws, volume=goal.name == ERRORS[1], rng=np.random.default_rng(seed),
-    )  # fmt: skip
+    volume, rng = {"volume": goal.name == ERRORS[1]}, np.random.default_rng(seed)
+    if goal.name == ERRORS[2]:
+        found = unknown_depth_trials(camera, goal.depths, goal.judged_scenes, light, draws=draws, rng=rng)
+    else:
+        found = reconstruction_trials(
+            camera, goal.depths, goal.judged_scenes, light, draws=draws, **volume, rng=rng
+        )
     shown = found.scene[0], found.reconstructed[0]
     return DrawnErrors(expected.value, found.rms, found.rms_error, shown, np.mean(found.errors**2, axis=1))
 
