@@ -30,7 +30,9 @@ def reproduce(
 ) -> Result:
     """Recompute the tables and figures of the thesis, beside the printed and the correct values.
 
-    Writes report.html and results.json. Finished parts of an interrupted run are not computed again.
+    Writes report.html and results.json. Each row says what it proves: "waves", a simulation against theory;
+    "closed form", a formula against the printed digits; "told", a number without theory. Finished parts of
+    an interrupted run are not computed again.
     With --json prints a list of rows. The exit code is 1 if any row is out of tolerance.
 
     Example: `lumigraph reproduce 5.4 --quick`
@@ -64,7 +66,7 @@ def reproduce(
         shown(Stage(1.0, "report"))
         pages.write_report(chosen, results, output / "report.html", quick=quick)
         run.write_records(results, output / "results.json")
-    text = "\n\n".join([*map(_table, results), f"Open {output / 'report.html'}"])
+    text = "\n\n".join([*map(_table, results), pages.counted(results), f"Open {output / 'report.html'}"])
     return Result(
         "Reproduce",
         "",

@@ -83,6 +83,7 @@ def plenoptic2(camera: FocusedPlenopticCamera) -> Description:
         Row("lenslet magnification", m, "", "m = b/a; " + ("Keplerian" if m > 0 else "Galilean")),
         Row("patch", camera.patch, "px", "m p z2 / L / pixel; " + ("turned" if m > 0 else "not turned")),
         Row("rendered cut-off", cutoff, "1/m", "|m| p / (λ b), on the main-lens image"),
+        *_stages(camera),
         Row("rendered cut-off at the object", cutoff * camera.magnification, "1/m", "times z2/z1"),
         Row(
             "rendered lobe",
@@ -92,6 +93,17 @@ def plenoptic2(camera: FocusedPlenopticCamera) -> Description:
         ),
     )
     return _with_lenslets(camera, ("Rendered picture", rendered))
+
+
+def _stages(camera: FocusedPlenopticCamera) -> tuple[Row, ...]:
+    """Settings of a bench's two stages, where a real main-lens image lies before the lenslets."""
+    b, a = camera.lenslet_distance, camera.relay_distance
+    if a < 0:
+        return ()
+    return (
+        Row("stage c", b, "m", "c = b, lenslets to sensor"),
+        Row("stage d", a - b, "m", "d = a - b, of the whole plenoptic stage"),
+    )
 
 
 def _with_lenslets(camera: LensletCamera, own: tuple[str, tuple[Row, ...]]) -> Description:

@@ -52,6 +52,25 @@ def relay_distance(focal_length: float, magnification: float) -> float:
     return lenslet_distance(focal_length, magnification) / magnification
 
 
+def translators(focal_length: float, magnification: float) -> tuple[float, float]:
+    """Settings c = b and d = a - b of a bench's two translation stages [m].
+
+    c sets the lenslets' distance from the sensor. d is how much farther the main-lens image is from the
+    lenslets, 0 at m = 1; the sensor then stands a + b behind that image.
+
+    References
+    ----------
+    Thesis table 6.1, columns c and d; its text has them the other way round.
+
+    Examples
+    --------
+    >>> [round(each * 1e3, 2) for each in translators(5.2e-3, 0.25)]
+    [6.5, 19.5]
+    """
+    b = lenslet_distance(focal_length, magnification)
+    return b, b / magnification - b
+
+
 def patch(pitch: float, magnification: float, image_distance: float, separation: float) -> float:
     """Width on the sensor of the piece that tiles the picture without seams, m p z2 / L [m], signed.
 

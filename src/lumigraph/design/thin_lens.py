@@ -85,3 +85,41 @@ def magnification(object_distance: float, image_distance: float) -> float:
     return checks.finite("image_distance", image_distance) / checks.positive(
         "object_distance", object_distance
     )
+
+
+def plano_convex_focal_length(radius: float, index: float) -> float:
+    """Focal length of a lens with one plane side, f = r/(n - 1) [m].
+
+    References
+    ----------
+    Thesis eq. 6.1.
+
+    Examples
+    --------
+    Lenslets of silica.
+
+    >>> round(plano_convex_focal_length(sag_radius(1.184e-6, 150e-6), 1.457) * 1e3, 2)
+    5.2
+    """
+    n = checks.positive("index", index)
+    if n <= 1:
+        raise GeometryError(f"index is {n:g} but a lens in air needs more than 1, such as 1.457 of silica.")
+    return checks.positive("radius", radius) / (n - 1)
+
+
+def sag_radius(sag: float, width: float) -> float:
+    """Radius of a sphere that rises by `sag` over the half of a lenslet's width, (s² + p²/4)/(2s) [m].
+
+    References
+    ----------
+    Thesis eq. 6.2.
+
+    Examples
+    --------
+    >>> sag_radius(1.0, 2.0)
+    1.0
+    """
+    s, p = checks.positive("sag", sag), checks.positive("width", width)
+    if s > p / 2:
+        raise GeometryError(f"sag is {s:g} m but a sphere of width {p:g} m rises by half of that at most.")
+    return (s**2 + p**2 / 4) / (2 * s)

@@ -27,6 +27,22 @@ def camera_path(kind: str) -> AbstractContextManager[Path]:
     return as_file(files("lumigraph.samples").joinpath(f"{kind}.toml"))
 
 
-def lens_path() -> AbstractContextManager[Path]:
-    """Context that gives the path of a lens' prescription: a double Gauss of 50 mm, f/2.5, as a ZMX file."""
-    return as_file(files("lumigraph.samples").joinpath("speed-panchro.zmx"))
+LENSES = ("speed-panchro", "thesis-prototype")
+
+
+def lens_path(name: str = "speed-panchro") -> AbstractContextManager[Path]:
+    """Context that gives the path of a lens' prescription, a ZMX file.
+
+    Parameters
+    ----------
+    name
+        "speed-panchro", a double Gauss of 50 mm, f/2.5; or "thesis-prototype", two plano-convex lenses of
+        120 mm with their flat sides outwards, 60.1 mm at 630 nm.
+
+    Raises
+    ------
+    GeometryError
+        Another name.
+    """
+    checks.choice("name", name, LENSES)
+    return as_file(files("lumigraph.samples").joinpath(f"{name}.zmx"))

@@ -20,7 +20,7 @@ from lumigraph.studies.thesis import (
     run,
 )
 
-KEYS = {"experiment", "quantity", "unit", "thesis", "expected", "got", "tolerance", "passed"}
+KEYS = {"experiment", "quantity", "unit", "thesis", "expected", "got", "tolerance", "passed", "kind"}
 
 
 def made(function, name="table-9.1"):

@@ -8,15 +8,17 @@ from lumigraph import plots, report
 from lumigraph.instruments import load_camera
 from lumigraph.report.pictures import Picture, picture
 from lumigraph.studies.thesis.registry import Experiment, ResultRow
-from lumigraph.studies.thesis.run import StoredResult
+from lumigraph.studies.thesis.run import StoredResult, kinds
 
 INTRODUCTION = """
 Every table and figure of the thesis that lumigraph started from, computed again. "Thesis" is what is printed
 there, "expected" what is right (from closed forms, exact integrals or independent calculations), "got" what
-lumigraph computed in this run. A row fails where got and expected differ by more than the tolerance; rows
-without an expected value are shown for information.
+lumigraph computed in this run. A row fails where got and expected differ by more than the tolerance.
+The last but one column says what a row proves. "waves": a simulated wave or a picture made of it agrees with
+theory. "closed form": a formula agrees with the printed digits or with another form of itself. "told": no
+theory gives this number; where one is expected, it is what an earlier run found.
 """
-HEADER = ("quantity", "unit", "thesis", "expected", "tolerance", "got", "", "note")
+HEADER = ("quantity", "unit", "thesis", "expected", "tolerance", "got", "", "kind", "note")
 _GIB = 2**30
 
 
@@ -48,6 +50,7 @@ def _overview(
     checked = [row for result in results for row in result.rows if row.passed is not None]
     failed = sum(not row.passed for row in checked)
     seconds, memory = sum(one.seconds for one in results), max(one.memory for one in results)
+    section.text(counted(results))
     section.text(
         f"{len(checked)} rows were checked: {len(checked) - failed} pass, {failed} fail. "
         f"{'Reduced' if quick else 'Full'} sizes took {seconds:.0f} s"
@@ -58,6 +61,15 @@ def _overview(
         for one, result in zip(chosen, results, strict=True)
     ]
     section.table(rows, header=("experiment", "what it is about", "rows", "fail", "time"))
+
+
+def counted(results: Sequence[StoredResult]) -> str:
+    """How many rows prove what, in a sentence."""
+    found = kinds(results)
+    return (
+        f"{sum(found.values())} rows: {found['waves']} proven by waves, {found['closed form']} closed forms "
+        f"and {found['told']} told, which have no theory."
+    )
 
 
 def _section(section: report.Section, one: Experiment, result: StoredResult) -> None:
@@ -84,7 +96,7 @@ def cells(row: ResultRow) -> tuple[str, ...]:
     verdict = {True: "passes", False: "FAILS", None: ""}[row.passed]
     return (
         row.quantity, row.unit, _text(row.thesis), _text(row.expected), _tolerance(row), _text(row.got),
-        verdict, row.note,
+        verdict, row.kind, row.note,
     )  # fmt: skip
 
 

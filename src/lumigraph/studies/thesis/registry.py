@@ -3,9 +3,9 @@
 import re
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,6 +14,10 @@ from lumigraph.core.progress import Progress, Stage
 from lumigraph.errors import FormatError, LumigraphError
 
 Tolerance = float | tuple[float, float]
+
+Kind = Literal["waves", "closed form", "told"]
+"""What a row proves: a computed wave or picture against theory, a formula against itself or its printed
+value, or nothing, where a number has no theory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +40,10 @@ class ResultRow:
         Largest absolute difference from `expected`, or the largest ones (below, above); may be infinite.
     note
         Why this number, in a few words.
+    kind
+        "waves": what was simulated or processed, against a closed form, an exact integral or a known scene.
+        "closed form": a formula against printed digits or another form of itself. "told": no theory is
+        known, and `expected`, if given, is what an earlier run found.
 
     Examples
     --------
@@ -52,6 +60,11 @@ class ResultRow:
     expected: float | None = None
     tolerance: Tolerance | None = None
     note: str = ""
+    kind: Kind = "waves"
+
+    def __post_init__(self) -> None:
+        if self.expected is None:
+            object.__setattr__(self, "kind", "told")
 
     @property
     def passed(self) -> bool | None:
@@ -197,6 +210,11 @@ class Experiment:
     def run(self, context: Context) -> ExperimentOutcome:
         """Rows and figures."""
         return self.function(context)
+
+
+def closed_forms(rows: Iterable[ResultRow]) -> tuple[ResultRow, ...]:
+    """The same rows, marked as formulas against printed digits or against themselves."""
+    return tuple(replace(row, kind="closed form") for row in rows)
 
 
 REGISTERED: dict[str, Experiment] = {}

@@ -196,6 +196,12 @@ def _peak_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
 
 
+def kinds(results: Sequence[StoredResult]) -> dict[str, int]:
+    """Number of rows of each kind: proven by waves, closed forms, and told."""
+    rows = [row for result in results for row in result.rows]
+    return {kind: sum(row.kind == kind for row in rows) for kind in ("waves", "closed form", "told")}
+
+
 def records(results: Sequence[StoredResult]) -> list[dict[str, Any]]:
     """Rows of all results as dictionaries of plain values; what is not finite becomes None."""
     return [
@@ -210,6 +216,7 @@ def records(results: Sequence[StoredResult]) -> list[dict[str, Any]]:
             if isinstance(row.tolerance, tuple)
             else _finite(row.tolerance),
             "passed": row.passed,
+            "kind": row.kind,
         }
         for result in results
         for row in result.rows

@@ -203,7 +203,14 @@ def _rows(
     for k, part in enumerate(PARTS):
         told = f"at {part:g} of the main lens's cut-off"
         rows.append(
-            ResultRow(f"modulation of the raw image {told}", modulation[k], "", None, *_expected(part))
+            ResultRow(
+                f"modulation of the raw image {told}",
+                modulation[k],
+                "",
+                None,
+                *_expected(part),
+                "waves" if part > 1 else "told",
+            )
         )
         rows += [ResultRow(f"contrast, {name}, {told}", values[k]) for name, values in transfer.items()]
         if noise:
@@ -212,7 +219,9 @@ def _rows(
     low, lost = PARTS.index(0.42), PARTS.index(1.1)
     gain = transfer["deconvolved"][low] / transfer["blended"][low]
     rows.append(
-        ResultRow("contrast, deconvolved over blended, at 0.42", gain, "", None, 1.5, (0.0, math.inf))
+        ResultRow(
+            "contrast, deconvolved over blended, at 0.42", gain, "", None, 1.5, (0.0, math.inf), kind="told"
+        )
     )
     rows.append(
         ResultRow(
@@ -221,7 +230,7 @@ def _rows(
             "",
             None,
             0.0,
-            0.1,
+            0.03,
             "nothing but noise",
         )
     )

@@ -76,6 +76,27 @@ def airy(r: np.ndarray, diameter: float = DIAMETER) -> np.ndarray:
     return np.square(np.divide(2 * j1(v), v, out=np.ones_like(v), where=v > 0))
 
 
+PINHOLE = 10 * um
+"""Diameter of the thesis' source in Tables 3.1 and 3.2 and figure 3.6."""
+
+
+def pinhole_image(diameter: float = DIAMETER) -> np.ndarray:
+    """Intensity (2000,) of the row through the middle that a pinhole's samples have, by Airy amplitudes.
+
+    Each sample, in phase with the wave that spreads over the object, has the amplitude 2 J1(v)/v: no
+    propagation method is used.
+    """
+    stop = CircularAperture(PINHOLE).transmission(GRID, WAVELENGTH)
+    total = np.zeros(GRID.shape[1], complex)
+    for i, j in zip(*np.nonzero(stop), strict=True):
+        y, x = GRID.y[i], GRID.x[j]
+        v = np.pi * diameter * np.hypot(y, GRID.x - x) / (WAVELENGTH * DISTANCE)
+        turn = np.exp(1j * np.pi * (y**2 + x**2) / (WAVELENGTH * DISTANCE))
+        total += stop[i, j] * turn * np.divide(2 * j1(v), v, out=np.ones_like(v), where=v > 0)
+    light = np.square(np.abs(total))
+    return light / light[GRID.shape[1] // 2]
+
+
 def middle(half: float) -> slice:
     """Samples of `GRID` within `half` [m] of the axis."""
     n, samples = GRID.shape[1] // 2, round(half / GRID.pitch[1])

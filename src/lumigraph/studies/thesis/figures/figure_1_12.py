@@ -59,11 +59,13 @@ def _layout_rows(camera: PlenopticCamera, views: LightField) -> list[ResultRow]:
     return [
         ResultRow("main-lens diameter, matched", camera.pupil_diameter / mm, "mm", 7.0,
             note="smaller than printed, so that 75 lenslets can be simulated; pixel for pixel the same"),
-        ResultRow("pixels across a micro-image", camera.calibration.lattice.pitch, "px", 20, 20, 1e-9),
-        ResultRow("directions per axis, N", nv, "", 20, 20, 0),
+        ResultRow("pixels across a micro-image", camera.calibration.lattice.pitch, "px", 20, 20, 1e-9,
+            kind="closed form"),
+        ResultRow("directions per axis, N", nv, "", 20, 20, 0, kind="closed form"),
         ResultRow("pixels of the array view per axis", views_mosaic(views).shape[0], "px", 1500 * count / 75,
-            _PIXELS * count, 0),
-        ResultRow("pixels of the rendered picture per axis", nt, "px", count, count, 0),
+            _PIXELS * count, 0, kind="closed form"),
+        ResultRow("pixels of the rendered picture per axis", nt, "px", count, count, 0,
+            kind="closed form"),
     ]  # fmt: skip
 
 

@@ -31,11 +31,12 @@ def run(context: Context) -> ExperimentOutcome:
     camera = point_camera(_M, (2.5 if context.quick else 5 / 3) * um)
     p, a, b = camera.lenslets.pitch, camera.relay_distance, camera.lenslet_distance
     rows = [
-        ResultRow("directions of one lenslet, p/a, over all, p/b", (p / a) / (p / b), "", 0.3, _M, 1e-9),
+        ResultRow("directions of one lenslet, p/a, over all, p/b", (p / a) / (p / b), "", 0.3, _M, 1e-9,
+            kind="closed form"),
         ResultRow("directions of each place, 1/m", plenoptic2.views_per_axis(_M), "", 3, 1 / _M, 1e-9,
-            note="3 in the figure, 3.33 in the mean of all places"),
+            note="3 in the figure, 3.33 in the mean of all places", kind="closed form"),
         ResultRow("all directions over those the main lens sends, D/z2", (p / b) / (
-            camera.pupil_diameter / camera.image_distance), "", 1.0, 1.0, 1e-9),
+            camera.pupil_diameter / camera.image_distance), "", 1.0, 1.0, 1e-9, kind="closed form"),
     ]  # fmt: skip
     samples = []
     for number, place in enumerate(_PLACES):
@@ -113,7 +114,7 @@ def _rows(
             "µm",
             None,
             place / um,
-            5.0,
+            2.0,
         ),
         ResultRow(
             f"largest difference between them, {place / um:.0f} µm",
@@ -121,7 +122,7 @@ def _rows(
             "µm",
             None,
             0.0,
-            20.0,
+            5.0,
             note="only the well lit ones; a lenslet's lobe is 232 µm wide here",
         ),
     ]

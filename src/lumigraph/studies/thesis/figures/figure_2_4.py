@@ -45,6 +45,7 @@ def run(context: Context) -> ExperimentOutcome:
                 expected=limit * um,
                 tolerance=step * um,
                 note="within one frequency sample",
+                kind="closed form",
             )
         )
     sine = WAVELENGTH / (2 * GRID.pitch[1])
@@ -58,6 +59,7 @@ def run(context: Context) -> ExperimentOutcome:
             expected=longest / mm,
             tolerance=0.01 * longest / mm,
             note="N p²/λ · sqrt(1 - (λ/2p)²); the last sample is 0.6 % below 1/(2p)",
+            kind="closed form",
         )
     )
     return ExperimentOutcome(tuple(rows), tuple(figures), WHY)
@@ -70,6 +72,7 @@ def _unaliased(f: np.ndarray, distance: float) -> ResultRow:
     return ResultRow(
         f"largest step of the phase over π, z = {distance / mm:g} mm", _steps(f, distance).max() / np.pi, "",
         expected=step, tolerance=1e-4, note="2 λ z f Δf / sqrt(1 - (λf)²); below 1, unaliased",
+        kind="closed form",
     )  # fmt: skip
 
 

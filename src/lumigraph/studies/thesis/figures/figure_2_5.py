@@ -41,6 +41,7 @@ def run(context: Context) -> ExperimentOutcome:
                 "1/um",
                 expected=limit * um,
                 tolerance=1e-4 * limit * um,
+                kind="closed form",
             ),
             ResultRow(
                 f"cut-off of the corrected method over the band limit, {name}",
@@ -49,6 +50,7 @@ def run(context: Context) -> ExperimentOutcome:
                 expected=2.0,
                 tolerance=0.01,
                 note="2 sqrt(1 + (W/2z)²)",
+                kind="closed form",
             ),
         ]
         pictures.append((_limited(distance, limit), name))

@@ -3,7 +3,13 @@
 import numpy as np
 
 from lumigraph.plots import curves
-from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
+from lumigraph.studies.thesis.registry import (
+    Context,
+    ExperimentOutcome,
+    ResultRow,
+    closed_forms,
+    experiment,
+)
 from lumigraph.units import nm
 
 WAVELENGTH, BANDWIDTH = 630 * nm, 20 * nm
@@ -29,32 +35,34 @@ def run(context: Context) -> ExperimentOutcome:
     even = (np.abs(frequency - centre) <= width / 2).astype(float)
     smooth = np.exp(-4 * np.log(2) * np.square((frequency - centre) / width))
     femto = 1e-15
-    rows = (
-        ResultRow(
-            "coherence time, even spectrum",
-            coherence_time(frequency, even) / femto,
-            "fs",
-            thesis=0.066,
-            expected=66.17,
-            tolerance=0.5,
-            note="λ²/(cΔλ) = 6.6e-14 s",
-        ),
-        ResultRow(
-            "coherence time, Gaussian spectrum",
-            coherence_time(frequency, smooth) / femto,
-            "fs",
-            expected=0.6643 * 66.17,
-            tolerance=0.5,
-            note="sqrt(2 ln 2/π)/Δν",
-        ),
-        ResultRow(
-            "coherence length",
-            coherence_time(frequency, even) * LIGHT * 1e6,
-            "µm",
-            expected=19.85,
-            tolerance=0.2,
-            note="λ²/Δλ",
-        ),
+    rows = closed_forms(
+        (
+            ResultRow(
+                "coherence time, even spectrum",
+                coherence_time(frequency, even) / femto,
+                "fs",
+                thesis=0.066,
+                expected=66.17,
+                tolerance=0.5,
+                note="λ²/(cΔλ) = 6.6e-14 s",
+            ),
+            ResultRow(
+                "coherence time, Gaussian spectrum",
+                coherence_time(frequency, smooth) / femto,
+                "fs",
+                expected=0.6643 * 66.17,
+                tolerance=0.5,
+                note="sqrt(2 ln 2/π)/Δν",
+            ),
+            ResultRow(
+                "coherence length",
+                coherence_time(frequency, even) * LIGHT * 1e6,
+                "µm",
+                expected=19.85,
+                tolerance=0.2,
+                note="λ²/Δλ",
+            ),
+        )
     )
     time = np.linspace(0, 200, 401) * femto
     figures = (

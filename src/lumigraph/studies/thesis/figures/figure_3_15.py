@@ -45,12 +45,12 @@ def run(context: Context) -> ExperimentOutcome:
     floor, coarse = found[coherence.INCOHERENCE], found[ratios[0]]
     rows = (
         ResultRow("floor for many snapshots, C/N = 0.14", floor.bias, expected=0.097, tolerance=0.03,
-            note="relative rms error; 0 for incoherent light"),
+            note="relative rms error; 0 for incoherent light", kind="told"),
         ResultRow("SNR of 300 snapshots, C/N = 0.14", _decibel(floor), "dB", thesis=18.0, expected=19.0,
-            tolerance=2.5, note="floor 0.097 ± 0.03 and speckle 0.8/sqrt(300)"),
+            tolerance=2.5, note="floor 0.097 ± 0.03 and speckle 0.8/sqrt(300)", kind="told"),
         ResultRow(f"SNR of 300 snapshots, C/N = {ratios[0]:g}", _decibel(coarse), "dB"),
         ResultRow("gain from the coarsest masks to C/N = 0.14", _decibel(floor) - _decibel(coarse), "dB",
-            thesis="grows, then levels off", expected=3.0, tolerance=(0.0, math.inf)),
+            thesis="grows, then levels off", expected=3.0, tolerance=(0.0, math.inf), kind="told"),
     )  # fmt: skip
     rows += () if context.quick else (_parallel_row(context, imager, count),)
     return ExperimentOutcome(rows, _figures(imager, found, pictures), WHY)

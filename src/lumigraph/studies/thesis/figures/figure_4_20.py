@@ -5,7 +5,13 @@ import numpy as np
 from lumigraph import plots
 from lumigraph.design import plenoptic1
 from lumigraph.instruments import PlenopticCamera
-from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
+from lumigraph.studies.thesis.registry import (
+    Context,
+    ExperimentOutcome,
+    ResultRow,
+    closed_forms,
+    experiment,
+)
 from lumigraph.units import mm
 
 _PRINTED = {
@@ -48,7 +54,7 @@ def run(context: Context) -> ExperimentOutcome:
         defocus, {"α' = (2f + 2Δz) / (2f + Δz)": alphas}, xlabel="defocus [mm]", ylabel="α'"
     )
     return ExperimentOutcome(
-        tuple(rows),
+        closed_forms(rows),
         ((figure, "4.20: the factor changes quickly before the focused plane and slowly behind it"),),
         why="In 4.14 the factor s of the defocus is printed without a value: it is 2.",
     )

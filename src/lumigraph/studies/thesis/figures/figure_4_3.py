@@ -30,8 +30,16 @@ def run(context: Context) -> ExperimentOutcome:
     kept = context.cached("kept", lambda: np.array([_kept(context, diameter) for diameter in diameters]))
     at = dict(zip((round(d / um) for d in diameters), kept, strict=True))
     rows = (
-        ResultRow("smallest lenslet at 10 mm", smallest / um, "µm", None, 124.28, 0.05),
-        ResultRow("Airy lobe of that lenslet over its width", lobe / smallest, "", 1.0, 1.0, 1e-9),
+        ResultRow("smallest lenslet at 10 mm", smallest / um, "µm", None, 124.28, 0.05, kind="closed form"),
+        ResultRow(
+            "Airy lobe of that lenslet over its width",
+            lobe / smallest,
+            "",
+            1.0,
+            1.0,
+            1e-9,
+            kind="closed form",
+        ),
         ResultRow(
             "smallest lenslet at 100 mm, the printed length of figure 4.4",
             plenoptic1.smallest_lenslet(wavelength, 100 * mm) / um,
@@ -40,6 +48,7 @@ def run(context: Context) -> ExperimentOutcome:
             393.0,
             0.1,
             note="four times as wide as printed",
+            kind="closed form",
         ),
         ResultRow(
             "directions left at the limit",
@@ -48,6 +57,7 @@ def run(context: Context) -> ExperimentOutcome:
             None,
             2.0,
             1e-9,
+            kind="closed form",
         ),
         ResultRow(
             "directions left in Table 4.1",
@@ -56,6 +66,7 @@ def run(context: Context) -> ExperimentOutcome:
             30.0,
             2.914,
             1e-3,
+            kind="closed form",
         ),
         ResultRow("light kept by lenslets of 150 µm", at[150], "", None, 0.904, 0.01),
         ResultRow("light kept at the limit", at[124], "", None, 0.808, 0.006, note="finer sum: 0.8082"),

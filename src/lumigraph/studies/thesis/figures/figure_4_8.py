@@ -85,11 +85,20 @@ def _aperture_rows(camera: PlenopticCamera, views: LightField) -> list[ResultRow
             0.6,
             0.05,
             note="ray optics: 1/4; a third of the directions are mixed by diffraction",
+            kind="told",
         ),
         ResultRow(
-            "area with the central view, over the whole", areas[2] / areas[0], "", "pinhole", 0.185, 0.015
+            "area with the central view, over the whole",
+            areas[2] / areas[0],
+            "",
+            "pinhole",
+            0.185,
+            0.015,
+            kind="told",
         ),
-        ResultRow("light with half the aperture, over the whole", light[1], "", "less", 0.35, 0.03),
+        ResultRow(
+            "light with half the aperture, over the whole", light[1], "", "less", 0.35, 0.03, kind="told"
+        ),
         ResultRow("light with the central view, over the whole", light[2], "", "noisier"),
     ]
 
@@ -103,8 +112,8 @@ def _view_rows(camera: PlenopticCamera, views: LightField) -> list[ResultRow]:
     rays = (1 - camera.alpha(_DZ)) * (u[last] - u[first])
     return [
         ResultRow("shift between two points of view", moved / um, "µm"),
-        ResultRow("shift between them over ray optics'", moved / rays, "", "moves", 1.0, (0.5, 0.05),
-            note="diffraction brings a part of every direction into every pixel"),
+        ResultRow("shift between them over ray optics'", moved / rays, "", "moves",
+            note="below 1: diffraction brings a part of every direction into every pixel"),
     ]  # fmt: skip
 
 

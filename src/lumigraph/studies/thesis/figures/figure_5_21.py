@@ -20,9 +20,6 @@ from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, Result
 FILTER = 1.162e4
 """Standard deviation of the thesis' Gaussian low-pass [1/m]."""
 
-_MAIN = {0.5: 0.69, 0.3: 0.715, 0.25: 0.726}
-"""Contrast of the second frequency in the main-lens image (± 0.05)."""
-
 _SAMPLES = 21  # of the picture per lenslet
 
 
@@ -104,19 +101,24 @@ def _low_pass(profile: np.ndarray, pitch: float) -> np.ndarray:
     return gaussian_filter1d(profile, 1 / (2 * math.pi * FILTER * pitch), truncate=6.0)
 
 
-def _lenslet_mtf(frequency: float, m: float) -> float:
-    """MTF of a round, ideal lenslet at a frequency of the main-lens image: Goodman, equation 6-31."""
+def _ideal(frequency: float, m: float) -> tuple[float, float]:
+    """MTF of the main lens and of a lenslet, both round and ideal, at a frequency of the main-lens image."""
     found = camera(m, 3)
-    part = frequency / rendered_cutoff(found.wavelength, found.lenslets.pitch, m, found.lenslet_distance)
+    tile = rendered_cutoff(found.wavelength, found.lenslets.pitch, m, found.lenslet_distance)
+    return _round(frequency * found.wavelength * found.f_number), _round(frequency / tile)
+
+
+def _round(part: float) -> float:
+    """MTF of a round pupil at a part of its cut-off: Goodman, equation 6-31."""
     return 2 / math.pi * (math.acos(part) - part * math.sqrt(1 - part**2))
 
 
 def _rows(gratings: list[_Grating], m: float) -> list[ResultRow]:
     second, third = gratings[1], gratings[2]
-    tile = _lenslet_mtf(second.frequency, m)
+    main, tile = _ideal(second.frequency, m)
     kept = math.exp(-(second.frequency**2) / (2 * FILTER**2))
     return [
-        ResultRow(f"f2, main lens, m = {m:g}", second.main_contrast, "", None, _MAIN[m], 0.05),
+        ResultRow(f"f2, main lens, m = {m:g}", second.main_contrast, "", None, main, 0.008),
         ResultRow(
             f"f2, rendered, m = {m:g}",
             second.rendered_contrast,

@@ -110,7 +110,7 @@ def _rows(name: str, found: FocusedPlenopticCamera, dz: float, seen: dict[str, _
     head = f"{name}, {dz * 1e3:+g} mm"
     rows = [
         ResultRow(f"m', {head}", found.magnification_at(dz), "", _printed_magnification(found, dz),
-            found.lenslet_distance / relay, 1e-6, "thesis: by equation 5.9"),
+            found.lenslet_distance / relay, 1e-6, "thesis: by equation 5.9", "closed form"),
     ]  # fmt: skip
     right, other = seen["right patch"], seen["focused plane's patch"]
     rows += [

@@ -8,7 +8,13 @@ from lumigraph.studies.thesis.figures._lenslet import FOCAL as _FOCAL
 from lumigraph.studies.thesis.figures._lenslet import IMAGE as _IMAGE
 from lumigraph.studies.thesis.figures._lenslet import PITCH as _PITCH
 from lumigraph.studies.thesis.figures._lenslet import traced
-from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
+from lumigraph.studies.thesis.registry import (
+    Context,
+    ExperimentOutcome,
+    ResultRow,
+    closed_forms,
+    experiment,
+)
 
 
 @experiment(
@@ -44,7 +50,7 @@ def run(context: Context) -> ExperimentOutcome:
         ),
     )
     return ExperimentOutcome(
-        rows,
+        closed_forms(rows),  # rays through matrices: no wave
         figures,
         why="Equation 5.15 calls z2 p/b a radius; it is a diameter. It gives each point 1/m views, but fills "
         "only z2/(z2 + a) of a micro-image.",

@@ -12,9 +12,8 @@ from lumigraph.core.raw import RawImage
 from lumigraph.plots.curves import curves, images
 from lumigraph.rendering import render
 from lumigraph.scene import targets
-from lumigraph.simulation import simulate
 from lumigraph.studies.thesis.figures import white_images
-from lumigraph.studies.thesis.figures.figure_6_8 import laboratory_camera, target
+from lumigraph.studies.thesis.figures.figure_6_8 import bench_image, laboratory_camera, target
 from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
 
 _TURN, _OFF = math.radians(0.3), -4.0
@@ -47,8 +46,9 @@ def run(context: Context) -> ExperimentOutcome:
     rows, drawn = _grids(white, camera.calibration)
     context.progress(0.4, "target")
     found = laboratory_camera(0.5, 21)
-    raw = RawImage(context.cached("raw", lambda: simulate(found, target(found, (3, 3))).data))
-    even = RawImage(context.cached("even", lambda: simulate(found, targets.white()).data))
+    found = found.replace(sensor={"pixel_pitch": 2 * found.pixels.pixel_pitch})
+    raw = RawImage(context.cached("raw", lambda: bench_image(found, target(found, (3, 3))).data))
+    even = RawImage(context.cached("even", lambda: bench_image(found, targets.white()).data))
     grids = {"right": found.calibration, "wrong": stretched(found.calibration, _OFF)}
     pictures, flat = (
         {name: np.asarray(render(one, grid, found.patch, samples=_SAMPLES)) for name, grid in grids.items()}

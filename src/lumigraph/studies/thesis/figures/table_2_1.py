@@ -12,7 +12,13 @@ from lumigraph.errors import SamplingWarning
 from lumigraph.plots import curves
 from lumigraph.propagation import propagate, sampling
 from lumigraph.scene.sources import gaussian_beam
-from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
+from lumigraph.studies.thesis.registry import (
+    Context,
+    ExperimentOutcome,
+    ResultRow,
+    closed_forms,
+    experiment,
+)
 from lumigraph.units import mm, nm, um
 
 WAVELENGTH, WAIST, DISTANCE = 633 * nm, 0.1 * mm, 500 * mm
@@ -67,7 +73,9 @@ def run(context: Context) -> ExperimentOutcome:
             ResultRow(f"time, {name}", seconds * 1e3, "ms"),
         ]  # fmt: skip
     figure = curves([], errors, xlabel="x [mm]", ylabel="|error| over the peak", log=True)
-    return ExperimentOutcome((*_facts(), *rows), ((figure, "Error of each method for a Gaussian beam"),), WHY)
+    return ExperimentOutcome(
+        (*closed_forms(_facts()), *rows), ((figure, "Error of each method for a Gaussian beam"),), WHY
+    )
 
 
 def _facts() -> list[ResultRow]:

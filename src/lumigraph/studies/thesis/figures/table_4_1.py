@@ -69,18 +69,36 @@ def run(context: Context) -> ExperimentOutcome:
     share = energies(raw, one.calibration, 3)
     directions = plenoptic1.resolvable_directions(one.wavelength, one.lenslets.pitch, one.lenslet_distance)
     rows = (
-        ResultRow("main-lens diameter, matched", one.pupil_diameter / mm, "mm", 3.6, 3.6, 1e-6),
-        ResultRow("f-number, f/D", one.main_lens.focal_length / one.pupil_diameter, "", 33.6, 33.333, 1e-3),
-        ResultRow("working f-number, z2/D", one.f_number, "", None, 66.667, 1e-3),
-        ResultRow("width of 101 lenslets", 101 * one.lenslets.pitch / mm, "mm", 20.0, 15.15, 1e-6),
+        ResultRow(
+            "main-lens diameter, matched", one.pupil_diameter / mm, "mm", 3.6, 3.6, 1e-6, kind="closed form"
+        ),
+        ResultRow(
+            "f-number, f/D",
+            one.main_lens.focal_length / one.pupil_diameter,
+            "",
+            33.6,
+            33.333,
+            1e-3,
+            kind="closed form",
+        ),
+        ResultRow("working f-number, z2/D", one.f_number, "", None, 66.667, 1e-3, kind="closed form"),
+        ResultRow(
+            "width of 101 lenslets",
+            101 * one.lenslets.pitch / mm,
+            "mm",
+            20.0,
+            15.15,
+            1e-6,
+            kind="closed form",
+        ),
         ResultRow(
             "micro-image pitch, on a white image",
             found.lattice.pitch * pixel / um,
             "µm",
             150.0,
             156.25,
-            0.5 * pixel / um,
-            note="half a pixel; it comes out to a hundredth",
+            0.02 * pixel / um,
+            note="a fiftieth of a pixel",
         ),
         ResultRow("light of a point in its own micro-image", share[3, 3], "", None, 0.904, 0.01),
         ResultRow(
@@ -89,9 +107,12 @@ def run(context: Context) -> ExperimentOutcome:
             "",
             None,
             0.904,
-            0.01,
+            0.005,
+            kind="closed form",
         ),
-        ResultRow("directions that diffraction leaves apart", directions, "", 30.0, 2.91, 0.01),
+        ResultRow(
+            "directions that diffraction leaves apart", directions, "", 30.0, 2.914, 0.001, kind="closed form"
+        ),
     )
     half = int(3.5 * one.calibration.lattice.pitch)
     middle = raw.shape[0] // 2

@@ -1,7 +1,13 @@
 """Table 5.2: the distances a and b and the main lens' diameter of three magnifications."""
 
 from lumigraph.studies.thesis.figures.point_images import MAGNIFICATIONS, camera
-from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
+from lumigraph.studies.thesis.registry import (
+    Context,
+    ExperimentOutcome,
+    ResultRow,
+    closed_forms,
+    experiment,
+)
 
 _PRINTED = {0.5: (15.6, 7.8, 2.3), 0.3: (22.5, 6.8, 2.7), 0.25: (26.0, 6.5, 2.8)}
 _EXACT = {0.5: (15.6, 7.8, 2.3077), 0.3: (22.5333, 6.76, 2.6627), 0.25: (26.0, 6.5, 2.7692)}
@@ -25,6 +31,6 @@ def run(context: Context) -> ExperimentOutcome:
         ):
             rows.append(ResultRow(f"{name}, m = {m:g}", value * 1e3, "mm", printed, exact, 0.01))
     return ExperimentOutcome(
-        tuple(rows),
+        closed_forms(rows),
         why="The thesis rounds to 0.1 mm. Table 5.1 prints lenslets of 5.3 mm; Table 5.2 belongs to 5.2 mm.",
     )

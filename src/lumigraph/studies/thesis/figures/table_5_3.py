@@ -9,7 +9,6 @@ from lumigraph.studies.thesis.figures.point_images import MAGNIFICATIONS, PointR
 from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
 
 _PRINTED = {0.5: (78.48, 200.0), 0.3: (68.48, 269.8), 0.25: (65.14, 357.4)}
-_RIGHT = {0.5: (80.0, 160.6), 0.3: (69.4, 231.9), 0.25: (66.9, 267.6)}
 
 
 @experiment(
@@ -44,9 +43,12 @@ def run(context: Context) -> ExperimentOutcome:
 def _rows(point: PointRendering, m: float) -> list[ResultRow]:
     part, grid = point.micro_image
     main, tile = _lobe(*point.main_profile), _lobe(grid.x, part[len(part) // 2])
-    printed, right = _PRINTED[m], _RIGHT[m]
+    printed, found = _PRINTED[m], point.camera
+    zero = 2 * 1.21967 * 1e6 * found.wavelength  # of an Airy pattern, over the f-number [um]
+    right = zero * found.f_number, zero * found.relay_distance / found.lenslets.pitch
     return [
-        ResultRow(f"main-lens lobe, m = {m:g}", main, "µm", printed[0], right[0], 1.0),
+        ResultRow(f"main-lens lobe, m = {m:g}", main, "µm", printed[0], right[0], 0.2,
+            note="2 · 1.2197 λF#"),
         ResultRow(f"rendered lobe, m = {m:g}", tile, "µm", printed[1], right[1], 0.1 * right[1],
             note="Fresnel ripples of the main lens' blurred disc move the zero by some per cent"),
         ResultRow(f"width over width, m = {m:g}", main / tile, "",

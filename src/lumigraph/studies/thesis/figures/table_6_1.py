@@ -123,13 +123,20 @@ def _checked(text: str, column: str, unit: str, got: float, cell: str) -> Result
     name = f"m = {text}: {column}"
     if right == math.inf:
         return ResultRow(
-            f"{name}, inverse", 1 / got, "1/m", f"{column} = {cell}", 0.0, 0.0, "misprint: infinite"
+            f"{name}, inverse",
+            1 / got,
+            "1/m",
+            f"{column} = {cell}",
+            0.0,
+            0.0,
+            "misprint: infinite",
+            "closed form",
         )
     if right is not None:
         tolerance = max(_half_digit(str(right)), _ROUNDING.get(column, 0.0))
-        return ResultRow(name, got, unit, float(cell), right, tolerance, "misprint")
+        return ResultRow(name, got, unit, float(cell), right, tolerance, "misprint", "closed form")
     tolerance = max(_half_digit(cell), _ROUNDING.get(column, 0.0))
-    return ResultRow(name, got, unit, float(cell), float(cell), tolerance)
+    return ResultRow(name, got, unit, float(cell), float(cell), tolerance, kind="closed form")
 
 
 def _half_digit(text: str) -> float:

@@ -71,11 +71,10 @@ def _found(
 
 
 def _rows(dz: float, finest: float, limit: float, contrasts: dict[float, float]) -> list[ResultRow]:
-    low, high = min(contrasts), max(contrasts)
-    expected = 0.0 if limit < low else min(limit, high)
-    # Elements are a sixth of an octave apart: three of them to either side, one of which is the reading.
-    ratio = 2 ** (3.1 / 6)
-    tolerance = (expected * (1 - 1 / ratio), expected * (ratio - 1)) if expected else (0.0, 1.0)
+    expected = 0.0 if limit < min(contrasts) else min(limit, max(contrasts))
+    # Elements are a sixth of an octave apart. Contrast 0.2 ends up to two below the band limit, or one above.
+    low, high = 2 ** (-2.1 / 6), 2 ** (1.1 / 6)
+    tolerance = (expected * (1 - low), expected * (high - 1)) if expected else (0.0, 1.0)
     return [
         ResultRow(
             f"finest bars resolved at {dz / um:g} µm", finest / 1e3, "line pairs/mm", None, expected / 1e3,
