@@ -70,7 +70,7 @@ CASES = {
             "--white", "lfm_guv/Radiometry_GUVExperim1.tif", "--dark", "lfm_guv/DarkFrame_GUVExperim1.tif",
             "--camera", "lfm-guv",
         ),
-        ("deconvolve", "RAW", "GIVEN", "--z", "-1 um,0 um,1 um", "--iterations", "10", "-o", "OUT.tiff"),
+        ("deconvolve", "RAW", "GIVEN", "--depth", "-1 um,0 um,1 um", "--iterations", "10", "-o", "OUT.tiff"),
         90.0,
     ),
 }  # fmt: skip

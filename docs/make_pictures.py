@@ -86,6 +86,12 @@ def bench() -> None:
     row(pictures, "bench-refocused.png", 1.6)
 
 
+def calibration() -> None:
+    """The lattice on the white image of a simulated 1.0 camera: calibrate-lattice.png."""
+    sample = lg.samples.bench()
+    save(lg.plots.lattice(sample.white, lg.calibrate(sample.white)), "calibrate-lattice.png")
+
+
 def microscope() -> None:
     """Raw image and volume of a light-field microscope: microscope-raw.png, microscope-volume.png."""
     from lumigraph.deconvolution import RichardsonLucy, filters
@@ -123,13 +129,34 @@ def viewer() -> None:
         screenshot(["view", f"{folder}/scene.zarr"], "viewer.png")
 
 
+STATES = {
+    "viewer-tilt.png": "#focus=0.98&tilt=-0.34,0",
+    "viewer-sharp.png": "#sharpen=2",
+    "viewer-depth.png": "#mode=depth&map=viridis",
+}
+"""Links of the viewer: the floor in focus from front to back, what is in focus sharpened, depth."""
+
+
+def states() -> None:
+    """The viewer with the sample scene in several states: `STATES`; a volume in 3-D: viewer-volume.png."""
+    with tempfile.TemporaryDirectory() as folder:
+        lg.samples.write(Path(folder), ("scene", "volume"))
+        for name, link in STATES.items():
+            screenshot(["view", f"{folder}/scene.zarr"], name, link)
+        volume = ["view", f"{folder}/volume-truth.ome.tif"]
+        screenshot(volume, "viewer-volume.png", "#mode=volume&projection=fog")
+
+
 def designer() -> None:
     """The designer with a camera of the catalogue: designer.png."""
     screenshot(["design", "thesis-plenoptic-2-m050", "--web"], "designer.png")
 
 
-def screenshot(command: list[str], name: str) -> None:
-    """Picture of the page that a command serves, in headless Chromium."""
+_IDLE = "!window.lumigraph || (lumigraph.ready && !document.getElementById('status').textContent)"
+
+
+def screenshot(command: list[str], name: str, link: str = "") -> None:
+    """Picture of the page that a command serves, with what a link says, in headless Chromium."""
     from playwright.sync_api import sync_playwright
 
     words = [str(Path(sys.executable).with_name("lumigraph")), *command, "--no-open"]
@@ -140,16 +167,19 @@ def screenshot(command: list[str], name: str) -> None:
             path = str(SYSTEM) if SYSTEM.exists() else None
             browser = play.chromium.launch(executable_path=path, args=FLAGS)
             page = browser.new_page(viewport={"width": 1280, "height": 800})
-            page.goto(address, timeout=240_000)
+            page.goto(address + link, timeout=240_000)
             page.wait_for_load_state("networkidle", timeout=240_000)
             page.wait_for_timeout(15_000)
+            while not page.evaluate(_IDLE):  # such as "Measuring depth"
+                page.wait_for_timeout(1_000)
+            page.wait_for_timeout(3_000)
             page.screenshot(path=STATIC / name, timeout=240_000)
             browser.close()
         finally:
             server.terminate()
 
 
-PICTURES = (first, bench, microscope, design, viewer, designer)
+PICTURES = (first, bench, calibration, microscope, design, viewer, states, designer)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Slices in partially coherent light, against sums of independent references and against its limits."""
 
 import math
+import re
 from functools import partial
 
 import numpy as np
@@ -10,6 +11,7 @@ from benchmarks import references
 import cameras
 from lumigraph.core.grid import Grid
 from lumigraph.core.modes import CoherentModes
+from lumigraph.core.progress import Needs
 from lumigraph.errors import GeometryError, SamplingError
 from lumigraph.instruments import LightFieldMicroscope, SingleLensCamera
 from lumigraph.scene import ExtendedSource, GaussianSchell, Scene, Slice, SpectralLine, targets
@@ -69,6 +71,15 @@ def test_a_point_of_light_far_away_is_coherent():
         raw = simulate(SINGLE, scene(), PartiallyCoherent(source))
         assert relative(raw.data, coherent) < 1e-5
         assert "1 modes" in raw.metadata["error"]["source"]
+
+
+def test_time_memory_and_modes_are_said_before_the_light_is_followed():
+    told = []
+    simulate(SINGLE, scene(), PartiallyCoherent(GaussianSchell(1e-3, 1e-4), 1e-2), progress=told.append)
+    needs = [k for k, fraction in enumerate(told) if isinstance(fraction, Needs)]
+    assert len(needs) == 1
+    assert re.fullmatch(r".*\d+ modes, [\d.]+ [KM]iB, about \d+ s", told[needs[0]].what)
+    assert told[needs[0]] < 0.05  # nothing but the first mode is done
 
 
 def test_a_source_that_fills_all_directions_is_incoherent():

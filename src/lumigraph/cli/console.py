@@ -11,7 +11,7 @@ from typing import Any
 
 from lumigraph.cli.options import Common
 from lumigraph.core.printable import printable, printable_json, printable_lines
-from lumigraph.core.progress import Progress, what_of
+from lumigraph.core.progress import Needs, Progress, what_of
 
 FIRST_LINE = 10.0
 """Seconds before progress is written where there is no terminal."""
@@ -40,6 +40,8 @@ def progress(task: str) -> Iterator[Progress]:
             if _interrupted.is_set():
                 raise KeyboardInterrupt
             text = printable(": ".join(filter(None, (task, what_of(fraction)))))
+            if isinstance(fraction, Needs):
+                line(text)
             update(description=text, completed=fraction, total=1.0)
 
         yield tell

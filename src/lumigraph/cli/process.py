@@ -35,7 +35,8 @@ class GivenOptions:
     dark
         Image with the lens covered: subtracted; shows which pixels are hot.
     camera
-        Camera file, or a name of the catalogue: gives lengths; of a microscope it gives a volume.
+        Camera file, or a name of the catalogue: gives lengths; of a microscope it gives a volume. Left out,
+        napari-LF's metadata.txt beside the raw image is read, and the white and dark images that it names.
     calibration
         File made by 'lumigraph calibrate', or by the camera's maker; one that lies beside the raw image
         under its name (.xml, .ini) is found.

@@ -42,11 +42,15 @@ class FocusOptions:
     depth
         Depth to focus on, from the focused plane, such as '5 mm' (farther), or a range '-10 um:10 um:5 um';
         may be repeated; needs --camera, which may be a microscope.
+    tilt
+        Focal tilt, for a plane that leans: α' in the last row less the first row's, and in the last column
+        less the first column's, such as 0.05 0.
     """
 
     alpha: Annotated[list[float] | None, Parameter(consume_multiple=True)] = None
     alphas: str | None = None
     depth: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True)] = None
+    tilt: Annotated[tuple[float, float], Parameter(allow_leading_hyphen=True)] = (0.0, 0.0)
 
     def check(self, camera: "Decoded | None") -> None:
         """Refuse what can be seen to be wrong before anything is read."""
@@ -123,9 +127,14 @@ class PictureOptions:
             return 1
         return rendering.detail(views) if self.oversample is None else self.oversample
 
-    def pictures(self, views: "LightField", alphas: list[float], shown: Progress) -> "list[Array]":
+    def pictures(
+        self, views: "LightField", alphas: list[float], tilt: tuple[float, float], shown: Progress
+    ) -> "list[Array]":
         """The pictures focused by each factor."""
         from lumigraph import rendering
+
+        if any(tilt) and self.method == "fourier":
+            raise FormatError("--tilt has no meaning with --method fourier. Use --method shear.")
 
         views = rendering.reduce_aperture(views, self.aperture, shape=self.aperture_shape)
         if self.method == "shear":
@@ -134,6 +143,7 @@ class PictureOptions:
                 alphas,
                 interpolation=self.interpolation,
                 oversample=self.samples(views),
+                tilt=tilt,
                 progress=shown,
             )
             return list(stack)
@@ -178,12 +188,12 @@ def refocus(
     with progress("refocus") as shown:
         source, notes = _light_field(views, origin)
         alphas = focus.chosen(camera, source)
-        images = quality.pictures(source, alphas, shown)
+        images = quality.pictures(source, alphas, focus.tilt, shown)
     shape, samples = images[0].shape[:2], quality.samples(source)
     values = (
         Quantity("alphas", alphas), Quantity("shape", shape, "px"), Quantity("method", quality.method),
         Quantity("samples_per_lenslet", samples), Quantity("aperture", quality.aperture),
-        Quantity("aperture_shape", quality.aperture_shape),
+        Quantity("aperture_shape", quality.aperture_shape), Quantity("tilt", focus.tilt),
     )  # fmt: skip
     return Result(
         "Refocus", "Pictures refocused; α' above 1 is farther.", images,

@@ -19,7 +19,7 @@
 - `arrays`: the only file that knows array libraries
 - `brief`: what a large object shows of itself in a few lines
 - `checks`: one-line refusals of bad numbers
-- `progress`: `Progress`, how far a computation has come
+- `progress`: `Progress`, how far a computation has come, and what it needs; `notes`: which notes matter
 - `cache`: arrays kept within a bound of memory
 - `coverage`: fractions of samples that shapes cover
 """

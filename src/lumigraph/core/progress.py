@@ -23,6 +23,14 @@ class Stage(float):
         return made
 
 
+class Needs(Stage):
+    """Fraction with what a long computation needs, in time and memory: told before it, and once.
+
+    >>> within(lambda told: print(type(told).__name__, told.what), 0, 1)(Needs(0.0, "300 MiB, about 40 s"))
+    Needs 300 MiB, about 40 s
+    """
+
+
 def silent(fraction: float) -> None:
     """Progress callback that does nothing."""
 
@@ -47,7 +55,8 @@ def within(progress: Progress | None, first: float, last: float, what: str = "")
         if progress is not None:
             text = ": ".join(filter(None, (what, what_of(fraction))))
             place = first + (last - first) * fraction
-            progress(Stage(place, text) if text else place)
+            kind = Needs if isinstance(fraction, Needs) else Stage
+            progress(kind(place, text) if text else place)
 
     return tell
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lumigraph.core.notes import mattering
 from lumigraph.core.printable import printable
 
 
@@ -134,8 +135,8 @@ class Result:
     failure: str = ""
 
     def text(self, known: Sequence[str] = ()) -> str:
-        """Text for a terminal, without the notes in `known`, which were printed before."""
-        notes = (f"note: {note}" for note in self.notes if note not in known)
+        """Text for a terminal, without the notes in `known`, printed before, and those that all is well."""
+        notes = (f"note: {note}" for note in mattering(self.notes) if note not in known)
         lines = (*self.headline, *notes, *(f"written {path}" for path in self.written))
         return "\n".join(map(printable, lines))
 

@@ -20,6 +20,7 @@ from lumigraph.instruments import Instrument, load_camera
 from lumigraph.instruments.capabilities import Rendered
 from lumigraph.preparation import prepare, read_calibration, sharp_kinds
 from lumigraph.preparation.given import read_raw
+from lumigraph.processing.napari_lf import FILE, settings_beside
 from lumigraph.processing.recognise import Guess
 from lumigraph.rendering import check_arrangement
 
@@ -163,13 +164,31 @@ def read(
         "raw image" if path is None else path.name, found, _image(white, "white image"),
         _image(dark, "dark image"), described, maker,
     )  # fmt: skip
-    if maker is not None or path is None or isinstance(found, LightField):
+    if path is None or isinstance(found, LightField):
+        return known
+    known = _as_set_up(known, path)
+    if maker is not None:
         return known
     beside = next((p for ending in _BESIDE if (p := path.with_suffix(ending)).is_file()), None)
     if beside is None:
         return known
     about = Guess("calibration", f"read from {beside.name}", "it lies beside the raw image under its name")
-    return replace(known, maker=beside, guesses=(about,))
+    return replace(known, maker=beside, guesses=(*known.guesses, about))
+
+
+def _as_set_up(known: Inputs, path: Path) -> Inputs:
+    """The inputs with what napari-LF's settings beside the raw image say and nobody gave."""
+    found = None if known.camera is not None else settings_beside(path, known.raw.shape)
+    if found is None:
+        return known
+    guesses = [Guess("camera", found.camera.noun, f"{FILE} of napari-LF beside {path.name} describes it")]
+    images = {"white": known.white, "dark": known.dark}
+    for what, image in images.items():
+        beside = getattr(found, what)
+        if image is None and beside is not None:
+            images[what] = _image(beside, f"{what} image")
+            guesses.append(Guess(f"{what} image", beside.name, f"{FILE} names it"))
+    return replace(known, camera=found.camera, guesses=(*known.guesses, *guesses), **images)
 
 
 def _image(source: Source | None, what: str) -> RawImage | None:

@@ -3,17 +3,14 @@
 import re
 from collections.abc import Iterable, Sequence
 
+from lumigraph.core import notes as core
 from lumigraph.processing.recognise import Guess
 
-_USUAL = (
-    re.compile(r".*: \d+ of \d+ pixels, 0 lenslets"),
-    re.compile(r"left out: 0 of \d+ lenslets"),
-    re.compile(r".* slips by 0\.0\d of a pitch .*"),
-    re.compile(r".* they agree"),
+_SAID = (
     re.compile(r"the (dark|white) image is (subtracted|divided out|in the model)"),
     re.compile(r"the lattice (is that of|was found on) .*"),
 )
-"""Notes that say that all is as it should be, or what a guess says already."""
+"""Notes that say what a guess says already."""
 
 _FILES = {
     "all-in-focus.png": "picture that is sharp at every depth",
@@ -28,12 +25,8 @@ _FILES = {
 
 
 def mattering(notes: Iterable[str]) -> tuple[str, ...]:
-    """Notes without those that say that all is as it should be, each once.
-
-    >>> mattering(["left out: 0 of 540 lenslets", "left out: 3 of 540 lenslets"])
-    ('left out: 3 of 540 lenslets',)
-    """
-    return tuple(dict.fromkeys(one for one in notes if not any(usual.fullmatch(one) for usual in _USUAL)))
+    """Notes of `core.notes.mattering` that no guess says already, each once."""
+    return core.mattering(notes, _SAID)
 
 
 def page(name: str, guesses: Sequence[Guess], notes: Sequence[str], files: Iterable[str]) -> str:

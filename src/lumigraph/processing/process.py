@@ -89,7 +89,8 @@ def process(
     white, dark
         Picture of an evenly lit surface, and one with the lens covered, with the same settings.
     camera
-        Camera file, a name of the catalogue, or a camera: gives lengths, and volumes of microscopes.
+        Camera file, a name of the catalogue, or a camera: gives lengths, and volumes of microscopes. Left
+        out, napari-LF's metadata.txt that names the raw image and lies beside it is found.
     calibration
         File made by `lumigraph calibrate`, or by the camera's maker; one that lies beside the raw image under
         its name (.xml, .ini) is found.

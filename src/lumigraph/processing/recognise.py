@@ -68,7 +68,8 @@ def recognise(
         )  # fmt: skip
     return "plenoptic 1.0", Guess(
         "kind", "plenoptic 1.0",
-        "neighbouring micro-images share no sharp details; for a microscope's volume, give --camera",
+        "neighbouring micro-images share no sharp details. Is it a microscope's? Then give --camera FILE or "
+        "NAME ('lumigraph catalogue' lists them) for a volume",
     )  # fmt: skip
 
 

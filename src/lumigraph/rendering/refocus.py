@@ -12,11 +12,12 @@ from scipy.ndimage import distance_transform_edt
 from lumigraph.core import checks, memory
 from lumigraph.core.arrays import A, Array, is_complex, is_numpy, like, namespace, to_numpy
 from lumigraph.core.lightfield import LightField
-from lumigraph.core.progress import Progress
+from lumigraph.core.progress import Progress, part
 from lumigraph.errors import GeometryError
 from lumigraph.rendering.detail import chosen
 from lumigraph.rendering.geometry import lit
 from lumigraph.rendering.interpolate import Interpolation, as_float, check_interpolation, take, taps, weighted
+from lumigraph.rendering.tilted import Tilt, check_tilt, tilted_sums
 from lumigraph.rendering.views import reduce_aperture
 
 _BLOCK = 10_000  # values summed at a time: they stay in the cache, and BLAS keeps to one thread
@@ -31,6 +32,7 @@ def refocus(
     aperture: float = 1.0,
     interpolation: Interpolation = "cubic",
     oversample: int | None = None,
+    tilt: Tilt = (0.0, 0.0),
 ) -> A:
     r"""Picture (t, s[, c]) focused on the plane whose image lies at F' = F / alpha behind the main lens.
 
@@ -59,11 +61,15 @@ def refocus(
         stay on the first and last lenslet: ((nt - 1) k + 1, (ns - 1) k + 1). If left out, a power of two, at
         most 8, that gives the picture 200 pixels along its longer side (`lumigraph.rendering.detail`); 1
         gives one sample per lenslet.
+    tilt
+        Focus on a plane that leans (focal tilt): alpha in the last row less the first row's, and in the last
+        column less the first column's; `alpha` itself holds in the middle of the picture.
 
     Raises
     ------
     GeometryError
-        alpha is not above 0 or moves every view out of the picture; oversample is below 1.
+        alpha is not above 0 or moves every view out of the picture; oversample is below 1; so much tilt that
+        alpha is not above 0 everywhere or that views fold over.
     LumigraphError
         It would not fit in memory.
 
@@ -74,7 +80,7 @@ def refocus(
     """
     checks.positive("alpha", alpha, "1")
     found = refocus_stack(
-        views, [alpha], aperture=aperture, interpolation=interpolation, oversample=oversample
+        views, [alpha], aperture=aperture, interpolation=interpolation, oversample=oversample, tilt=tilt
     )
     return found[0, ...]
 
@@ -86,6 +92,7 @@ def refocus_stack(
     aperture: float = 1.0,
     interpolation: Interpolation = "cubic",
     oversample: int | None = None,
+    tilt: Tilt = (0.0, 0.0),
     progress: Progress | None = None,
 ) -> A:
     """Pictures (n, t, s[, c]) focused on one plane for each alpha; see `refocus`.
@@ -95,7 +102,7 @@ def refocus_stack(
 
     Parameters
     ----------
-    views, aperture, interpolation, oversample
+    views, aperture, interpolation, oversample, tilt
         As for `refocus`.
     alphas
         F / F' of each picture, above 0.
@@ -116,6 +123,12 @@ def refocus_stack(
     oversample = chosen(views, oversample)
     _check_memory(views, len(alphas), oversample)
     open_views = lit(views.data)
+    if any(tilt := check_tilt(tilt, alphas)):
+        how, count = (oversample, interpolation), len(alphas)
+        return namespace(views.data).stack([
+            _tilted(views, open_views, alpha, tilt, how, part(progress, k, count))
+            for k, alpha in enumerate(alphas)
+        ])  # fmt: skip
     planes = [_Plane.of(views, alpha, oversample, interpolation) for alpha in alphas]
     if views.valid is None:
         total, seen = _sheared(views.data, open_views, planes, progress), None
@@ -134,6 +147,20 @@ def refocus_stack(
             picture = weighted(total[k, ...], _inverse(seen[k]), tail)
             pictures.append(_closed(picture, seen[k] > _LEAST_VALID * share))
     return xp.stack(pictures)
+
+
+def _tilted(
+    views: LightField,
+    open_views: np.ndarray,
+    alpha: float,
+    tilt: Tilt,
+    how: tuple[int, Interpolation],
+    progress: Progress,
+) -> Array:
+    """Picture (t, s[, c]) focused on a plane that leans."""
+    total, seen, share = tilted_sums(views, open_views, alpha, tilt, how, progress)
+    picture = weighted(total, _inverse(seen), len(views.data.shape) - 4)
+    return picture if views.valid is None else _closed(picture, seen > _LEAST_VALID * share)
 
 
 def shifts(views: LightField, alpha: float) -> tuple[np.ndarray, np.ndarray]:

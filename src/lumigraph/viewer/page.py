@@ -16,8 +16,8 @@ from lumigraph.viewer.server import Content, Resource, Site
 MODULES = (
     "colours.js", "tone.js", "turning.js", "source.js", "aperture.js", "focusing.js", "shaders.js",
     "device.js", "canvas.js", "refocus.js", "overlay.js", "measures.js", "state.js", "epi.js", "finer.js",
-    "rays.js", "sections.js", "models.js", "picking.js", "pane.js", "quilt.js", "histogram.js", "play.js",
-    "saving.js", "webm.js", "film.js", "controls.js", "keys.js", "main.js",
+    "rays.js", "sections.js", "finishing.js", "models.js", "picking.js", "pane.js", "quilt.js",
+    "histogram.js", "play.js", "saving.js", "webm.js", "film.js", "controls.js", "keys.js", "main.js",
 )  # fmt: skip
 """Modules in the order of their imports: a module comes after those it uses."""
 

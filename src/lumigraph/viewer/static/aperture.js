@@ -53,6 +53,35 @@ export function isAlone(views, { aperture }) {
   return keptViews(views, aperture).every((n) => n === 1);
 }
 
+/** Refocus factor in the first sample of a picture, and its growth from sample to sample (down, across): it is linear where the plane that is sharp leans. */
+export function planeOf(views, focus, tilt = [0, 0]) {
+  const most = tiltLimits(views), kept = tilt.map((t, k) => Math.min(most[k], Math.max(-most[k], t)));
+  return { corner: focus - (kept[0] + kept[1]) / 2, slope: kept.map((t, k) => t / Math.max(views.shape[2 + k] - 1, 1)) };
+}
+
+export function alphaAt({ corner, slope }, [y, x]) {
+  return corner + slope[0] * y + slope[1] * x;
+}
+
+/** Refocus factors in the corners of a picture of samples (ny, nx). */
+export function cornersOf(plane, [ny, nx]) {
+  return [0, ny - 1].flatMap((y) => [0, nx - 1].map((x) => alphaAt(plane, [y, x])));
+}
+
+/** The same plane in a part of the picture whose samples are `factor` of the picture's. */
+export function planeFrom(plane, origin, factor) {
+  return { corner: alphaAt(plane, origin), slope: plane.slope.map((s) => s * factor) };
+}
+
+/** The most that the plane may lean (down, across): what the focus spans, and less than what folds the outermost views. */
+export function tiltLimits(views) {
+  const [low, high] = views.focus;
+  return [0, 1].map((k) => {
+    const { first, step } = viewShifts(views, 0, k), n = views.shape[2 + k], most = Math.max(Math.abs(first), Math.abs(first + (views.shape[k] - 1) * step));
+    return n > 1 ? Math.min(high - low, (0.9 * (n - 1)) / Math.max(most, 1e-9)) : 0;
+  });
+}
+
 /** How far each view is moved along an axis (0: t, 1: s) to focus on alpha: first view's, and the step [lenslets]. */
 export function viewShifts(views, alpha, axis) {
   const { pitch, center, shape } = views.aperture, lenslet = views.lenslets.pitch[axis];

@@ -1,6 +1,6 @@
 // The controls beside the picture, and what they say.
 
-import { freedom, keptViews, middleView, viewShifts } from "./aperture.js";
+import { freedom, keptViews, middleView, tiltLimits, viewShifts } from "./aperture.js";
 import { MAPS } from "./colours.js";
 import { Histogram } from "./histogram.js";
 import { depthMap } from "./models.js";
@@ -13,7 +13,8 @@ import { cachedMap } from "./tone.js";
 
 const by = (id) => document.getElementById(id);
 const SELECTS = { shape: String, drag: String, detail: Number, projection: String, map: String, channel: String };
-const RANGES = ["focus", "trust", "plane", "density", "ev", "black", "gamma"];
+const RANGES = ["focus", "trust", "plane", "density", "ev", "black", "gamma", "sharpen", "denoise"];
+const TILTS = ["tilt-down", "tilt-across"];
 const CHECKS = ["epi", "lattice", "smooth", "sharp"];
 
 /** Writes into an output only what is new: the browser lays a page out afresh after every write. */
@@ -27,6 +28,7 @@ export class Controls {
     this.app = app;
     for (const name of MAPS) by("map").append(new Option(name[0].toUpperCase() + name.slice(1), name));
     for (const id of RANGES) by(id).addEventListener("input", (e) => app.set({ [id]: id === "density" ? 10 ** Number(e.target.value) : Number(e.target.value) }));
+    TILTS.forEach((id, k) => by(id).addEventListener("input", (e) => app.set({ tilt: app.state.tilt.map((t, i) => (i === k ? Number(e.target.value) : t)) })));
     ["cross-y", "cross-x"].forEach((id, k) => by(id).addEventListener("input", (e) => {
       const [, ...cross] = app.volumeModel.cross(app.state);
       cross[k] = Number(e.target.value);
@@ -120,9 +122,10 @@ export class Controls {
     for (const part of document.querySelectorAll('[data-part="sharp"]')) part.hidden = !about.sharp;
     by("quilt").hidden = state.mode !== "picture" || !canQuilt(model);
     for (const part of document.querySelectorAll('[data-part="views"]')) part.hidden ||= !model.views;
+    for (const part of document.querySelectorAll('[data-part="map"]')) part.hidden = !about.depth;
     for (const part of document.querySelectorAll('[data-part="lattice"]')) part.hidden = !about.raw?.lattice;
     this.focus(model, state);
-    if (model.views) this.aperture(model, state);
+    if (model.views) { this.aperture(model, state); this.finish(model, state); }
     if (this.app.volumeModel) this.volume(this.app.volumeModel.about.volume, state);
     if (state.mode === "depth") this.depth(model, state);
     this.measures(state);
@@ -164,6 +167,21 @@ export class Controls {
     by("detail").value = state.detail ?? model.views.detail;
     for (const id of ["shape", "detail"]) by(id).disabled = model.complete && !exact;
     this.drawPad();
+  }
+
+  /** How the plane that is sharp leans, and what is done to the picture after refocusing. */
+  finish(model, state) {
+    const exact = model.refocuser && state.renderer !== "stack", limits = tiltLimits(model.views), word = model.samples(state).word;
+    TILTS.forEach((id, k) => {
+      Object.assign(by(id), { min: -limits[k], max: limits[k], value: state.tilt[k], disabled: (model.complete && !exact) || state.sharp || !limits[k] });
+      const shift = -model.factor * viewShifts(model.views, 1 - state.tilt[k], 1).step;
+      tell(`${id}-out`, state.tilt[k] ? `${model.views.relative ? "" : `${signed(state.tilt[k], (x) => x.toFixed(4))} · `}${signed(shift, (x) => `${x.toFixed(2)} ${word} per view`)}` : "level");
+      by(id).setAttribute("aria-valuetext", by(`${id}-out`).value);
+    });
+    for (const id of ["sharpen", "denoise"]) {
+      Object.assign(by(id), { value: state[id], disabled: model.complete && !exact });
+      tell(`${id}-out`, `${Math.round(100 * state[id])} %`);
+    }
   }
 
   volume(volume, state) {

@@ -1,6 +1,6 @@
 // Epipolar-plane images through a place: (u, s) along its row, (v, t) along its column.
 
-import { middleView, viewShifts } from "./aperture.js";
+import { alphaAt, middleView, planeOf, viewShifts } from "./aperture.js";
 import { toneBytes } from "./tone.js";
 
 /** Numbers of the EPI through (t, s): along "s" (nu × ns) or along "t" (nt × nv). */
@@ -34,7 +34,7 @@ export function drawEpis({ bottom, right }, model, state, place, { origin, scale
     else context.setTransform(...(across ? [0, view, step, 0, edge, 0] : [view, 0, 0, step, 0, edge]));
     context.drawImage(small, 0, 0);
     context.resetTransform();
-    const shift = viewShifts(views, state.focus, along === "s" ? 1 : 0), base = along === "s" ? point[1] : point[0];
+    const shift = viewShifts(views, alphaAt(planeOf(views, state.focus, state.tilt), point), along === "s" ? 1 : 0), base = along === "s" ? point[1] : point[0];
     const line = [0, count - 1].map((k) => [start + (base + shift.first + k * shift.step) * step, (k + 0.5) * view]);
     context.strokeStyle = colour;
     context.lineWidth = 1.5 * ratio;

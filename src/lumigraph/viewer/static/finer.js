@@ -1,6 +1,6 @@
 // What is finer than the pictures that the page has: tiles of what is seen, fetched when somebody looks there.
 
-import { viewShifts } from "./aperture.js";
+import { cornersOf, planeFrom, viewShifts } from "./aperture.js";
 import { Refocuser } from "./refocus.js";
 import { loadArray } from "./source.js";
 
@@ -127,10 +127,10 @@ function span(tile, k) {
 
 /** Views of a window, refocused by the graphics processor. */
 export class ViewsWindow {
-  constructor(device, views, { sides, step, pictures, rect }, coarsest) {
+  constructor(device, views, { sides, step, pictures, rect, tiles }, coarsest, tile) {
     const [v0, v1, u0, u1] = rect, shape = [v1 - v0 + 1, u1 - u0 + 1], { aperture, lenslets } = views;
     const middle = (k) => [v0, u0][k] + Math.floor(shape[k] / 2) - Math.floor(views.shape[k] / 2);
-    Object.assign(this, { rect, pictures, masked: views.masked, kind: views });
+    Object.assign(this, { rect, pictures, masked: views.masked, kind: views, origin: tiles.map(([first]) => (first * tile * step) / coarsest) });
     this.views = {
       ...views, shape: [...shape, ...sides], factor: step / coarsest,
       aperture: { ...aperture, center: aperture.center.map((c, k) => c + middle(k) * aperture.pitch[k]) },
@@ -150,17 +150,17 @@ export class ViewsWindow {
     this.refocuser.addPart(at, corner, size, numbers, masks ? this.refocuser.mask : this.refocuser.array);
   }
 
-  /** The picture focused on alpha with the weights of all views, in a part; null while `patient` drawing goes on from frame to frame. */
-  picture(alpha, weights, alone, { part, patient = false } = {}) {
+  /** The picture focused on a plane with the weights of all views, in a part; null while `patient` drawing goes on from frame to frame. */
+  picture(plane, weights, alone, { part, patient = false } = {}) {
     const [v0, v1, u0, u1] = this.rect, nu = this.kind.shape[1], own = new Float32Array((v1 - v0 + 1) * (u1 - u0 + 1));
     for (let v = v0, k = 0; v <= v1; v++) for (let u = u0; u <= u1; u++, k++) own[k] = weights[v * nu + u];
-    const key = JSON.stringify([alpha, alone, part, ...own]);
+    const key = JSON.stringify([plane, alone, part, ...own]);
     if (key !== this.key) {
       this.work?.return();
-      Object.assign(this, { key, work: this.refocuser.drawing(alpha, own, 1, alone, part), took: 0 });
+      Object.assign(this, { key, work: this.refocuser.drawing(planeFrom(plane, this.origin, this.views.factor), own, 1, alone, part), took: 0 });
     }
     if (this.work) this.draw(patient ? SLICE : Infinity);
-    return this.work ? null : { white: this.kind.white, scale: this.views.scale, offset: this.views.offset, bits: this.views.bits, ...this.drawn };
+    return this.work ? null : { white: this.kind.white, scale: this.views.scale, offset: this.views.offset, bits: this.views.bits, stamp: key, ...this.drawn };
   }
 
   /** Goes on with what is being drawn, for some time [ms]. */
@@ -201,8 +201,8 @@ export class PlaneWindow {
   }
 }
 
-/** Views that count, the rectangle of the aperture that they fill, and how far they move at a focus [samples of the coarsest]. */
-export function used(views, weights, alpha) {
+/** Views that count, the rectangle of the aperture that they fill, and how far they move at most [samples of the coarsest]. */
+export function used(views, weights, plane) {
   const [nv, nu] = views.shape, rect = [nv, -1, nu, -1];
   weights.forEach((weight, k) => {
     if (weight <= 0) return;
@@ -212,8 +212,8 @@ export function used(views, weights, alpha) {
   const pictures = [];
   for (let v = rect[0]; v <= rect[1]; v++) for (let u = rect[2]; u <= rect[3]; u++) pictures.push(v * nu + u);
   const margin = [0, 1].map((axis) => {
-    const { first, step } = viewShifts(views, alpha, axis);
-    return Math.max(...rect.slice(2 * axis, 2 * axis + 2).map((k) => Math.abs(first + k * step))) + 2;
+    const { first, step } = viewShifts(views, 0, axis), most = Math.max(...cornersOf(plane, views.shape.slice(2)).map((alpha) => Math.abs(1 - alpha)));
+    return most * Math.max(...rect.slice(2 * axis, 2 * axis + 2).map((k) => Math.abs(first + k * step))) + 2;
   });
   return { rect, pictures, margin };
 }

@@ -1,5 +1,7 @@
 // Keys that work everywhere on the page but in a control that uses them itself.
 
+import { tiltLimits } from "./aperture.js";
+
 const MODES = ["picture", "raw", "depth", "volume"];
 
 export function listenToKeys(app, actions) {
@@ -29,12 +31,19 @@ function act(app, actions, event) {
   if (MODES[Number(key) - 1] && main.model.modes[MODES[Number(key) - 1]]) app.set({ mode: MODES[Number(key) - 1] });
   else if (key === "e") app.set({ epi: !state.epi });
   else if (key === "a" && main.model.about.sharp) app.set({ sharp: !state.sharp });
+  else if ("tyTY".includes(key) && main.model.views && state.mode === "picture") lean(app, key);
   else if (key === "m") app.set({ drag: { move: "ruler", ruler: "region", region: "move" }[state.drag] });
   else if (key === "l") app.set({ lattice: !state.lattice });
   else if (key === "[" || key === "]") app.set({ aperture: Math.min(1, Math.max(0.001, state.aperture + (key === "]" ? 0.1 : -0.1))) });
   else if (key === "," || key === ".") app.set({ ev: Math.min(12, Math.max(-12, state.ev + (key === "." ? 0.25 : -0.25))) });
   else return false;
   return true;
+}
+
+/** Tilts the sharp plane by a twentieth of what is possible: T down the picture, Y across it, Shift the other way. */
+function lean(app, key) {
+  const k = key.toLowerCase() === "t" ? 0 : 1, most = tiltLimits(app.main.model.views)[k], step = (key === key.toLowerCase() ? most : -most) / 20;
+  app.set({ tilt: app.state.tilt.map((t, i) => (i === k ? Math.min(most, Math.max(-most, t + step)) : t)) });
 }
 
 /** One step of what the mode's slider moves. */

@@ -1,6 +1,7 @@
 // One exhibit: its arrays as they come, and the image that the settings ask for.
 
-import { isAlone, middleView, viewWeights } from "./aperture.js";
+import { isAlone, middleView, planeOf, viewWeights } from "./aperture.js";
+import { Finisher } from "./finishing.js";
 import { Finer, PlaneWindow, used, ViewsWindow } from "./finer.js";
 import { RayCaster, RAYS } from "./rays.js";
 import { Refocuser } from "./refocus.js";
@@ -71,7 +72,7 @@ export class Model {
 
   /** The poster, where it is what the settings ask for and the views are not there yet. */
   poster(state) {
-    const { views, arrays: { poster } } = this, whole = state.aperture === 1 && state.shape === "square";
+    const { views, arrays: { poster } } = this, whole = state.aperture === 1 && state.shape === "square" && !state.tilt.some(Boolean) && !state.denoise;
     if (!poster || !whole || state.focus !== views.start || (state.detail ?? views.detail) !== views.detail) return null;
     const [, ny, nx] = poster.shape;
     return this.seen({ nx, ny, ...coding(poster), numbers: poster.numbers, detail: views.detail, early: true });
@@ -111,7 +112,7 @@ export class Model {
     const { shape: [nv, nu], detail } = this.views, weights = new Float32Array(nv * nu).fill(1, 0, nu);
     const time = () => {
       const start = performance.now();
-      this.refocuser.picture(1 + 1e-3, weights, detail);
+      this.refocuser.picture(planeOf(this.views, 1 + 1e-3), weights, detail);
       device.finish();
       return performance.now() - start;
     };
@@ -137,7 +138,7 @@ export class Model {
   filmPlan(states) {
     const { views, finer: { views: finer } } = this;
     if (!finer || !this.complete || !this.refocuser || states[0].mode !== "picture" || states[0].renderer === "stack") return null;
-    const [nv, nu, nt, ns] = views.shape, all = states.map((state) => used(views, viewWeights(views, state), state.focus));
+    const [nv, nu, nt, ns] = views.shape, all = states.map((state) => used(views, viewWeights(views, state), planeOf(views, state.focus, state.tilt)));
     const rect = [0, 1, 2, 3].map((k) => Math[k % 2 ? "max" : "min"](...all.map((one) => one.rect[k]))), margin = [0, 1].map((k) => Math.max(...all.map((one) => one.margin[k])));
     const pictures = Array.from({ length: nv * nu }, (_, k) => k).filter((k) => k >= rect[0] * nu && k < (rect[1] + 1) * nu && k % nu >= rect[2] && k % nu <= rect[3]);
     const most = (PATIENCE / Math.max(this.took, 1)) * nv * nu * nt * ns * views.detail, seen = { low: [0, 0], high: [nt - 1, ns - 1], scale: WIDEST / ns };
@@ -147,25 +148,26 @@ export class Model {
 
   /** The window of a film's plan, and a function of its settings that gives their finer pictures. */
   async filmWindow(plan, device, signal) {
-    const { views, finer: { views: finer } } = this, window = finer.empty(plan, (found) => new ViewsWindow(device, views, found, finer.coarsest));
+    const { views, finer: { views: finer } } = this, window = finer.empty(plan, (found) => new ViewsWindow(device, views, found, finer.coarsest, finer.tile));
     try { await finer.fill(window, plan, signal); } catch (error) { window.release(); throw error; }
     const place = finer.place(window, plan.margin);
-    return { release: () => window.release(), at: (state) => ({ ...place, image: window.picture(state.focus, viewWeights(views, state), isAlone(views, state)) }) };
+    return { release: () => window.release(), at: (state) => ({ ...place, image: this.finished(window.picture(planeOf(views, state.focus, state.tilt), viewWeights(views, state), isAlone(views, state)), state, device, true, place) }) };
   }
 
   fineViews(state, device, seen, settled) {
     const { views, finer: { views: finer } } = this;
     if (!finer || !this.complete || !this.refocuser || state.renderer === "stack") return null;
-    const weights = viewWeights(views, state), { rect, pictures, margin } = used(views, weights, state.focus);
+    const weights = viewWeights(views, state), focused = planeOf(views, state.focus, state.tilt), { rect, pictures, margin } = used(views, weights, focused);
     const [nv, nu, nt, ns] = views.shape;
     const each = Math.max(this.took, 1) / (nv * nu * nt * ns * views.detail), longest = views.masked ? PATIENCE : LONGEST;
     const plan = finer.plan(seen, pictures, { margin, most: longest / each, whole: views.masked, extra: 16 * (rect[1] - rect[0] + 2) });
-    if (settled && plan) finer.want({ ...plan, rect }, (found) => new ViewsWindow(device, views, { ...found, rect }, finer.coarsest));
+    if (settled && plan) finer.want({ ...plan, rect }, (found) => new ViewsWindow(device, views, { ...found, rect }, finer.coarsest, finer.tile));
     const { window } = finer;
     if (!plan || !window || !pictures.every((index) => window.kept.has(index)) || (!settled && (this.slow || window.took > SLOW))) return null;
-    const part = finer.part(window, seen), image = window.picture(state.focus, weights, isAlone(views, state), { part, patient: plan.samples * each > PATIENCE });
+    const part = finer.part(window, seen), image = window.picture(focused, weights, isAlone(views, state), { part, patient: plan.samples * each > PATIENCE });
     if (!image) this.changed();
-    return image && { ...finer.place(window, margin, views.masked ? undefined : part), image };
+    const place = finer.place(window, margin, views.masked ? undefined : part);
+    return image && { ...place, image: this.finished(image, state, device, settled, place) };
   }
 
   finePlane(state, device, seen, settled) {
@@ -176,6 +178,14 @@ export class Model {
     return plan && finer.window?.kept.has(k) ? { ...finer.place(finer.window), image: finer.window.image } : null;
   }
 
+  /** A picture of views with less noise and sharper where in focus, as the settings say; `where` its samples lie. */
+  finished(image, state, device, settled, where = undefined) {
+    const wanted = state.mode === "picture" && this.views && this.complete && (state.sharpen || state.denoise);
+    if (!image || !wanted || device?.kind !== "webgl" || (this.slow && !settled)) return image;
+    const finisher = (this.finishers ??= {})[where ? "part" : "whole"] ??= new Finisher(device);
+    return finisher.finish(image, this, state, where);
+  }
+
   /** What to show: {nx, ny, channels, numbers or texture, ... , base: [ny, nx], detail, aspect}; null if not yet. */
   image(state, device, settled) {
     if (!this.modes[state.mode]) return null;
@@ -184,6 +194,10 @@ export class Model {
   }
 
   picture(state, device, settled) {
+    return this.finished(this.unfinished(state, device, settled), state, device, settled);
+  }
+
+  unfinished(state, device, settled) {
     const { views } = this, sharp = state.sharp && views ? this.need("sharp") : null;
     if (sharp) return this.seen({ nx: views.shape[3], ny: views.shape[2], ...coding(sharp), numbers: sharp.numbers, exact: true });
     if (!views) return this.plane(state.focus);
@@ -202,9 +216,9 @@ export class Model {
   }
 
   /** The refocused picture; drawn afresh only where the last one was another. */
-  refocused({ focus, aperture, shape, view }, weights, detail) {
-    const { refocuser, views } = this, key = JSON.stringify([focus, aperture, shape, view, detail]);
-    if (refocuser.key !== key) this.drawn = refocuser.picture(focus, weights, detail, isAlone(views, { aperture }));
+  refocused({ focus, tilt, aperture, shape, view }, weights, detail) {
+    const { refocuser, views } = this, key = JSON.stringify([focus, tilt, aperture, shape, view, detail]);
+    if (refocuser.key !== key) this.drawn = refocuser.picture(planeOf(views, focus, tilt), weights, detail, isAlone(views, { aperture }));
     refocuser.key = key;
     return this.drawn;
   }

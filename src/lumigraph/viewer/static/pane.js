@@ -1,6 +1,6 @@
 // One exhibit on the screen: its canvas, what is drawn over it, and the pointer.
 
-import { freedom, keptViews, middleView } from "./aperture.js";
+import { alphaAt, freedom, keptViews, middleView, planeOf } from "./aperture.js";
 import { CanvasDevice } from "./canvas.js";
 import { openDevice } from "./device.js";
 import { drawEpis } from "./epi.js";
@@ -265,7 +265,9 @@ export class Pane {
     if (this.image?.sections) { this.cut(place); return; }
     if (this.app.state.sharp) { this.app.tell("Everything is in focus. Uncheck “All in focus” to choose."); return; }
     const focus = this.focusAt(place);
-    if (focus !== null) this.app.set({ focus, point: place });
+    if (focus === null) return;
+    const { views } = this.model, leaning = views ? alphaAt(planeOf(views, 0, this.app.state.tilt), place) : 0; // the plane goes through the place and leans as before
+    this.app.set({ focus: focus - leaning, point: place });
   }
 
   zoomAt([left, top], factor, moved = [0, 0]) {

@@ -1,6 +1,6 @@
 // Refocused pictures by WebGL: views moved and summed along u, then along v, as lumigraph.refocus does.
 
-import { viewShifts } from "./aperture.js";
+import { alphaAt, cornersOf, viewShifts } from "./aperture.js";
 import { CLOSE, NEAREST_ROW, SHEAR_COLUMN, SHEAR_ROW } from "./shaders.js";
 
 /** Views in one layer of the texture (across, down): one, where there are layers enough. */
@@ -58,24 +58,25 @@ export class Refocuser {
     for (const texture of [this.array.texture, this.mask.texture, this.rows, this.target, this.nearest, this.whole]) if (texture) this.device.gl.deleteTexture(texture);
   }
 
-  /** The picture focused on alpha: {nx, ny, channels, texture}; `alone`: of one view, which has no black edge. */
-  picture(alpha, weights, detail, alone = false) {
-    const work = this.drawing(alpha, weights, detail, alone);
+  /** The picture focused on a plane (`planeOf` of aperture.js): {nx, ny, channels, texture}; `alone`: of one view, which has no black edge. */
+  picture(plane, weights, detail, alone = false) {
+    const work = this.drawing(plane, weights, detail, alone);
     this.key = null;
     for (;;) { const { done, value } = work.next(); if (done) return value; }
   }
 
   /** The same in steps, one for each row of the aperture; of valid views, only a part {start, end} of the picture. */
-  *drawing(alpha, weights, detail, alone = false, part = null) {
+  *drawing(plane, weights, detail, alone = false, part = null) {
     const { device, views } = this, [nv, nu, nt, ns] = views.shape;
     const nx = (ns - 1) * detail + 1, ny = (nt - 1) * detail + 1;
     this.prepare(nx, ny);
     const used = new Float32Array(nv);
     for (let v = 0; v < nv; v++) used[v] = weights.subarray(v * nu, (v + 1) * nu).some((w) => w > 0) ? 1 : 0;
     const all = this.weights(weights, nu, nv), rows = this.weights(used, nv, 1);
-    const across = viewShifts(views, alpha, 1), along = viewShifts(views, alpha, 0);
+    const across = viewShifts(views, 0, 1), along = viewShifts(views, 0, 0), lean = [1 - plane.corner, -plane.slope[0], -plane.slope[1]];
+    const middle = 1 - alphaAt(plane, [(nt - 1) / 2, (ns - 1) / 2]), most = Math.max(...cornersOf(plane, [nt, ns]).map((alpha) => Math.abs(1 - alpha)));
     const shear = device.program("shear-row", SHEAR_ROW), made = [all, rows];
-    const cut = !views.masked && part, reach = cut && 2 + Math.ceil(Math.max(...[0, nv - 1].map((v) => Math.abs(along.first + v * along.step))));
+    const cut = !views.masked && part, reach = cut && 2 + Math.ceil(most * Math.max(...[0, nv - 1].map((v) => Math.abs(along.first + v * along.step))));
     const within = (margin, draw) => {
       if (cut) device.within([cut.start[1], cut.start[0] - margin], [cut.end[1], cut.end[0] + margin]);
       draw();
@@ -93,13 +94,15 @@ export class Refocuser {
         gl.uniform1i(at.count, nu);
         gl.uniform2i(at.size, ns, nt);
         gl.uniform2i(at.tiles, ...this.tiles);
+        gl.uniform3fv(at.plane, lean);
+        gl.uniform1f(at.down, along.first + v * along.step);
         gl.uniform1f(at.first, across.first);
         gl.uniform1f(at.step_, across.step);
         gl.uniform1f(at.detail, detail);
       }, v));
         yield;
       }
-      const shares = views.masked ? this.weights(rowShares(weights, [nv, nu, nx, ns], across, detail, alone), nx, nv) : rows;
+      const shares = views.masked ? this.weights(rowShares(weights, [nv, nu, nx, ns], { first: middle * across.first, step: middle * across.step }, detail, alone), nx, nv) : rows;
       made.push(shares);
       within(0, () => device.draw(device.program("shear-column", SHEAR_COLUMN), [nx, ny], this.target, (at, gl) => {
         device.bind(0, gl.TEXTURE_2D_ARRAY, this.rows, at.rows);
@@ -109,6 +112,7 @@ export class Refocuser {
         gl.uniform1i(at.count, nv);
         gl.uniform1i(at.alone, alone ? 1 : 0);
         gl.uniform1i(at.height, nt);
+        gl.uniform3fv(at.plane, lean);
         gl.uniform1f(at.first, along.first);
         gl.uniform1f(at.step_, along.step);
         gl.uniform1f(at.detail, detail);

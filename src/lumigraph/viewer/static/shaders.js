@@ -21,17 +21,21 @@ uniform sampler2D weights;
 uniform int row, count;   // row of the aperture, views in it
 uniform ivec2 size;       // of a view: columns, rows
 uniform ivec2 tiles;      // views in one layer: across, down
-uniform float first, step_, detail;
+uniform float first, step_, detail, down; // shifts of the views for alpha = 0: along s, and that of their row along t
+uniform vec3 plane;       // 1 - alpha in the first sample, and its growth down and across
 out vec4 total;
 ${CUBIC}
 void main() {
   ivec2 place = ivec2(gl_FragCoord.xy);
-  float at = float(place.x) / detail + first;
+  float column_ = float(place.x) / detail, still = plane.x + plane.z * column_;
+  float line = (float(place.y) - down * still) / (1.0 + down * plane.y); // of the picture, which this row of the view goes to
+  float defocus = still + plane.y * line;
+  float at = column_ + defocus * first;
   total = vec4(0.0);
   for (int u = 0; u < count; u++) {
     float weight = texelFetch(weights, ivec2(u, row), 0).r;
     if (weight == 0.0) continue;
-    float x = at + float(u) * step_, below = floor(x);
+    float x = at + defocus * float(u) * step_, below = floor(x);
     vec4 k = weight * cubic(x - below);
     int index = row * count + u, tile = index % (tiles.x * tiles.y), left = int(below) - 1;
     ivec2 corner = ivec2(tile % tiles.x, tile / tiles.x) * size;
@@ -56,17 +60,19 @@ uniform bool alone, masked;
 uniform int count;
 uniform int height;
 uniform float first, step_, detail;
+uniform vec3 plane; // 1 - alpha in the first sample, and its growth down and across
 out vec4 picture;
 ${CUBIC}
 void main() {
   ivec2 place = ivec2(gl_FragCoord.xy);
-  float at = float(place.y) / detail + first;
+  vec2 sample_ = vec2(place) / detail;
+  float defocus = plane.x + plane.y * sample_.y + plane.z * sample_.x, at = sample_.y + defocus * first;
   vec4 total = vec4(0.0);
   float whole = 0.0;
   for (int v = 0; v < count; v++) {
     if (texelFetch(weights, ivec2(v, 0), 0).r == 0.0) continue;
     float share = masked ? texelFetch(shares, ivec2(place.x, v), 0).r : 0.0;
-    float y = at + float(v) * step_, below = floor(y);
+    float y = at + defocus * float(v) * step_, below = floor(y);
     vec4 k = cubic(y - below);
     int top = int(below) - 1;
     for (int i = 0; i < 4; i++) {
@@ -117,6 +123,56 @@ void main() {
     if (off.y > 0.0 && (far < least || (far == least && x < from.x))) { least = far; from = ivec2(x, place.y + int(off.x)); }
   }
   picture = vec4(texelFetch(source, from, 0).rgb, 1.0);
+}`;
+
+const SOURCE = (whole) => `#version 300 es
+precision highp float; precision highp int;
+${whole ? "precision highp usampler2DArray; uniform usampler2DArray source;" : "uniform sampler2D source;"}
+uniform ivec2 size;  // of the picture
+uniform int stride;  // pixels between the samples of a kernel
+vec3 raw(ivec2 p) {
+  p = clamp(p, ivec2(0), size - 1);
+  return ${whole ? "vec3(texelFetch(source, ivec3(p, 0), 0).rgb)" : "texelFetch(source, p, 0).rgb"};
+}`;
+
+/** Bilateral filter (Tomasi and Manduchi 1998): the mean of near pixels that differ by no more than noise does. */
+export const DENOISE = (whole) => `${SOURCE(whole)}
+uniform float width, channels; // standard deviations of the noise that are averaged, in numbers of the picture
+out vec4 picture;
+void main() {
+  ivec2 place = ivec2(gl_FragCoord.xy);
+  vec3 here = raw(place), total = vec3(0.0);
+  float sum = 0.0;
+  for (int j = -3; j <= 3; j++) for (int i = -3; i <= 3; i++) {
+    vec3 other = raw(place + stride * ivec2(i, j)), off = (other - here) / width;
+    float k = exp(-0.125 * float(i * i + j * j) - dot(off, off) / (2.0 * channels));
+    total += k * other;
+    sum += k;
+  }
+  picture = vec4(total / sum, 1.0);
+}`;
+
+/** Unsharp mask where the picture is in focus. */
+export const SHARPEN = (whole) => `${SOURCE(whole)}
+uniform sampler2D focus;         // how much each lenslet's place is in focus
+uniform ivec2 grid;              // of lenslets
+uniform vec2 origin;             // the picture's first pixel, in lenslets
+uniform float factor, amount;    // lenslets for a pixel
+out vec4 picture;
+float lenslet(ivec2 p) { return texelFetch(focus, clamp(p, ivec2(0), grid - 1), 0).r; }
+void main() {
+  ivec2 place = ivec2(gl_FragCoord.xy);
+  vec3 here = raw(place), blurred = vec3(0.0);
+  float sum = 0.0;
+  for (int j = -3; j <= 3; j++) for (int i = -3; i <= 3; i++) {
+    float k = exp(-0.22 * float(i * i + j * j)); // a standard deviation of 1.5 samples
+    blurred += k * raw(place + stride * ivec2(i, j));
+    sum += k;
+  }
+  vec2 at = origin + factor * vec2(place), below = floor(at), f = at - below;
+  ivec2 p = ivec2(below);
+  float share = mix(mix(lenslet(p), lenslet(p + ivec2(1, 0)), f.x), mix(lenslet(p + ivec2(0, 1)), lenslet(p + ivec2(1, 1)), f.x), f.y);
+  picture = vec4(max(vec3(0.0), here + amount * share * (here - blurred / sum)), 1.0);
 }`;
 
 /** A picture on the screen: zoomed, exposed, coloured. */

@@ -24,6 +24,9 @@ const both = (digits) => (value) => value.map(plain(digits)).join(",");
 const FIELDS = {
   mode: [null, choice("picture", "raw", "depth", "volume"), String],
   focus: [null, number(-1e9, 1e9), plain(5)],
+  tilt: [[0, 0], pair(-10, 10), both(5)],
+  sharpen: [0, number(0, 3), plain(2)],
+  denoise: [0, number(0, 1), plain(2)],
   aperture: [1, (text) => { const p = number(0.1, 100)(text.replace("%", "")); return p && p / 100; }, (v) => `${plain(1)(100 * v)}%`],
   shape: ["square", choice("square", "round"), String],
   view: [null, pair(-1e4, 1e4), both(2)],
