@@ -278,12 +278,37 @@ def white(camera: Any, across: int = 96, fineness: Fineness = FINE) -> np.ndarra
     unit, weight = np.polynomial.legendre.leggauss(across)
     half, total = camera.pupil_diameter / 2, 0.0
     t = np.pi / 2 * unit
-    for v, w in zip(half * np.sin(t), half * np.cos(t) * np.pi / 2 * weight, strict=True):
+    down = half * np.sin(t), half * np.cos(t) * np.pi / 2 * weight
+    if relay._separable is not None:
+        return _white_of_squares(relay, half, down, (unit, weight)) / (math.pi * half**2)
+    for v, w in zip(*down, strict=True):
         chord = math.sqrt(half**2 - v**2)
         waves = [_from(v, u, squared) for u in chord * unit]
         for share, f in zip(chord * weight * w, relay.fields(waves), strict=True):
             total = total + share * np.abs(f) ** 2
     return relay.pixels(np.asarray(total)) / (math.pi * half**2)
+
+
+Nodes = tuple[np.ndarray, np.ndarray]
+"""Places and weights of a quadrature."""
+
+
+def _white_of_squares(relay: Relay, half: float, down: Nodes, across: Nodes) -> np.ndarray:
+    """Integral over the stop behind square lenslets, whose waves are products of one along each axis."""
+    assert relay._separable is not None
+    y, x, behind_y, behind_x = relay._separable
+    squared = relay.camera.wavelength * relay.camera.separation
+
+    def seen(behind: np.ndarray, at: np.ndarray, places: np.ndarray) -> np.ndarray:
+        waves = np.exp(1j * np.pi * np.subtract.outer(at, places) ** 2 / squared)
+        light = np.abs(behind @ waves) ** 2
+        return np.einsum("iqn,q->in", light.reshape(-1, relay.fineness.pixel, len(places)), relay.shares / 2)
+
+    rows, columns = seen(behind_y, y, down[0]), []
+    for v in down[0]:
+        chord = math.sqrt(half**2 - v**2)
+        columns.append(seen(behind_x, x, chord * across[0]) @ (chord * across[1]))
+    return (rows * down[1]) @ np.array(columns)
 
 
 def _from(v: float, u: float, squared: float) -> Any:

@@ -114,17 +114,8 @@ def of_points(difference: float, accuracy: float) -> ReachedError:
     )
 
 
-NARROW, MORE = 2, 12.0
-"""Lenslets along an axis up to which white images are off by more than light that is followed less far says,
-and how much more: 1 x 4 and 2 x 4 ones by 6 to 23 times."""
-
-
-def of_white(difference: float, accuracy: float, camera: CameraOptics) -> ReachedError:
+def of_white(difference: float, accuracy: float) -> ReachedError:
     """Error of a white image, from the difference that `white.image_and_error` finds."""
-    assert camera.array is not None  # as white images before lenslets ask
-    extent = camera.array.extent or camera.sensor.grid.size
-    if min(extent) < (NARROW + 0.5) * camera.array.lattice.pitch:
-        difference *= MORE
     return ReachedError(
         difference, f"white image at accuracy {accuracy:g}, beside light that is followed less far"
     )

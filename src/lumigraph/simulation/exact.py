@@ -86,7 +86,7 @@ def _image_of(
         return _without_lenslets(camera, part, accuracy)
     if isinstance(part, Diffuser):
         image, off = white.image_and_error(plain, accuracy)
-        return part.intensity * image, error.of_white(off, accuracy, plain).through(plain)
+        return part.intensity * image, error.of_white(off, accuracy).through(plain)
     plain = resolved(plain, accuracy)
     aslant = error.aslant(part, plain) if plain.surface is not None else 0.0
     if isinstance(part, Points):
