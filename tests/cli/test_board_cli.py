@@ -42,7 +42,15 @@ def test_what_is_missing_is_named(table, capsys, words, said) -> None:
     assert said in capsys.readouterr().err
 
 
-def test_a_plan_for_a_camera_1_knows_what_is_lit_and_says_what_stays_unknown(monkeypatch, capsys) -> None:
+@pytest.fixture
+def few_distances(monkeypatch):
+    """Plans that choose among a third of the distances."""
+    monkeypatch.setattr("lumigraph.metrology.boards.planning._DISTANCES", 8)
+
+
+def test_a_plan_for_a_camera_1_knows_what_is_lit_and_says_what_stays_unknown(
+    few_distances, monkeypatch, capsys
+) -> None:
     asked, plan = [], metrology.plan
 
     def noted(camera, calibration, *given, **options):
@@ -71,7 +79,7 @@ def test_a_plan_for_a_camera_1_knows_what_is_lit_and_says_what_stays_unknown(mon
     assert "stays as well known" not in capsys.readouterr().out
 
 
-def test_a_plan_says_which_pictures_to_take(capsys) -> None:
+def test_a_plan_says_which_pictures_to_take(few_distances, capsys) -> None:
     words = [
         "board",
         "plan",

@@ -133,6 +133,7 @@ def test_notes_that_all_is_well_are_left_out():
     assert mattering((*told, told[1])) == told[1:]
 
 
+@pytest.mark.long  # 18 s: patches of three kinds
 def test_a_multi_focus_camera_is_recognised_and_rendered_with_the_calibration_beside_it(tmp_path):
     found = lg.process(real("raytrix_r42_multifocus", "sc2_klein.png"), folder=tmp_path / "out")
     assert found.kind == "multi-focus plenoptic 2.0"

@@ -36,6 +36,8 @@ DISCS = slow(
     },
     0.4 * mm,
 )
+SMALL = slow(START | {"lenslets": START["lenslets"] | {"pitch": 0.08 * mm, "focal_length": 3.2 * mm}})
+"""A sixth of the points of a cell."""
 GRID = Grid((9, 8), (60 * um, 60 * um))
 
 
@@ -51,7 +53,7 @@ def scene(rng):
 @pytest.mark.parametrize(
     ("kind", "given", "keys"),
     [
-        ("2.0", slow(START), ("object_distance", "wavelength", "lenslets.pitch")),
+        ("2.0", SMALL, ("object_distance", "wavelength", "lenslets.pitch")),
         ("1.0", ONE, ("main_lens.focal_length",)),
         pytest.param("2.0", DISCS, ("lenslets.focal_length",), marks=pytest.mark.long),
     ],
@@ -70,8 +72,7 @@ def test_slopes_are_central_differences_of_raw_images(kind, given, keys, scene, 
 
 
 def test_the_gradient_is_the_derivatives_transpose_and_adds_up_objects(rng):
-    given = slow(START)
-    seen = plane(camera(given), [pair(given, key) for key in KEYS])
+    seen = plane(camera(SMALL), [pair(SMALL, key) for key in KEYS])
     objects, weights = rng.random((2, *GRID.shape)), rng.standard_normal((2, *seen.shape[0]))
     change = rng.standard_normal(len(KEYS))
     moved = np.stack([seen.derivative(one, change) for one in objects])
@@ -82,8 +83,8 @@ def test_the_gradient_is_the_derivatives_transpose_and_adds_up_objects(rng):
 @pytest.mark.parametrize(
     ("given", "count", "most"),
     [
-        (slow(START), (6, 6), 1e-2),
-        pytest.param(slow(START), (4, 3), 3e-2, marks=pytest.mark.long),
+        pytest.param(slow(START), (6, 6), 1e-2, marks=pytest.mark.long),
+        (slow(START), (4, 3), 3e-2),
         (ONE, (8, 7), 1e-2),
     ],
     ids=["2.0", "2.0, with the array's border", "1.0"],
@@ -93,13 +94,12 @@ def test_raw_images_are_those_of_the_operator(given, count, most):
     one = camera(given | {"lenslets": given["lenslets"] | {"count": count}}, "1.0" if given is ONE else "2.0")
     wide = one.operator_grid(4)
     x = np.random.default_rng(0).random(wide.shape)
-    true = one.operator_on(wide, [DZ], accuracy=2e-3).forward(x[None])
+    true = one.operator_on(wide, [DZ], accuracy=most / 5).forward(x[None])
     assert off(one.part_plane([], wide, DZ).forward(x), true) < most
 
 
 def test_a_gradient_takes_less_than_three_times_the_memory_of_an_image(scene, rng):
-    given = slow(START)
-    seen = plane(camera(given), [pair(given, key) for key in KEYS[1:6:2]])
+    seen = plane(camera(SMALL), [pair(SMALL, key) for key in KEYS[1:6:2]])
     weights = rng.random(seen.shape[0])
     assert peak(lambda: seen.gradient(scene, weights)) < 3 * peak(lambda: seen.forward(scene))
 
