@@ -98,6 +98,7 @@ def test_no_aberration_is_invented():
 STRONG = {5: 0.4, 6: -0.5, 7: 0.45, 8: 0.4, 9: -0.35, 10: 0.3, 11: -0.25}
 
 
+@pytest.mark.long  # 10 s
 def test_shifts_of_views_begin_a_strong_wavefront():
     found = estimate(exposed(STRONG, 2e4), SCOPE, DEPTHS, tuple(STRONG), exposure=EXPOSURE)
     assert found.coefficients == pytest.approx(STRONG, abs=0.02)
