@@ -9,7 +9,7 @@ from lumigraph.sensor.angular import AngularResponse
 
 
 class Angles(CameraTable):
-    """Table ``[sensor.angular_response]``; see `lumigraph.sensor.AngularResponse`.
+    """Table ``[sensor.angular_response]``; see `lumigraph.sensor.angular.AngularResponse`.
 
     Angles count from the chief ray: on-chip microlenses are taken to be offset for the main lens of the
     camera, so that each pixel responds most to light from its middle.

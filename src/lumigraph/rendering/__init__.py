@@ -17,13 +17,19 @@ from lumigraph.rendering.encode import encode
 from lumigraph.rendering.focused import render, render_stack, sight_grid
 from lumigraph.rendering.fourier_slice import refocus_fourier
 from lumigraph.rendering.kinds import match_kinds
-from lumigraph.rendering.patches import sharp_patches
+from lumigraph.rendering.patches import lenslet_indices, sharp_patches
 from lumigraph.rendering.paths import view_path
 from lumigraph.rendering.pixels import hot_pixels
 from lumigraph.rendering.refocus import refocus, refocus_stack
 from lumigraph.rendering.sharp import all_in_focus
 from lumigraph.rendering.super_resolution import super_resolve
-from lumigraph.rendering.views import arranged, reduce_aperture, sub_aperture, views_from_mosaic
+from lumigraph.rendering.views import (
+    arranged,
+    point_of_view,
+    reduce_aperture,
+    sub_aperture,
+    views_from_mosaic,
+)
 
 __all__ = [
     "all_in_focus",
@@ -34,7 +40,9 @@ __all__ = [
     "encode",
     "finer",
     "hot_pixels",
+    "lenslet_indices",
     "match_kinds",
+    "point_of_view",
     "reduce_aperture",
     "refocus",
     "refocus_fourier",

@@ -36,7 +36,7 @@ Errors = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 class LensletDifferences(Protocol):
-    """Differences between lenslets, as `lumigraph.elements.Scatter` has them."""
+    """Differences between lenslets, as `lumigraph.elements.scatter.Scatter` has them."""
 
     def of(self, i: np.ndarray, j: np.ndarray) -> Errors:
         """Errors of lenslets (i, j)."""
