@@ -74,6 +74,10 @@ ALL = [
 ]  # fmt: skip
 
 
+BEHIND_HEX = ("wavelength", "lenslets.pitch", "lenslets.focal_length.0")
+"""Keys by which the light before hexagons, their edges and one of their kinds change."""
+
+
 def camera(given, kind="2.0"):
     of = lg.FocusedPlenopticCamera if kind == "2.0" else lg.PlenopticCamera
     return of(**given)
@@ -102,7 +106,15 @@ def off(found, true):
 
 
 @pytest.mark.parametrize(
-    ("kind", "given", "key"), ALL, ids=[f"{k} {named(given)} {key}" for k, given, key in ALL]
+    ("kind", "given", "key"),
+    [
+        pytest.param(
+            *one,
+            id=f"{one[0]} {named(one[1])} {one[2]}",
+            marks=pytest.mark.long if one[1] is HEX and one[2] not in BEHIND_HEX else (),
+        )
+        for one in ALL
+    ],
 )
 def test_derivatives_are_central_differences_of_images(kind, given, key):
     """Of cameras farther to either side than the pair is, sampled as each asks for."""
