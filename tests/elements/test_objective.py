@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from scipy.special import j0, j1
 
 from lumigraph.elements.mismatch import Mismatch
 from lumigraph.elements.objective import Objective, focus_intensity
@@ -184,13 +183,6 @@ def test_a_thicker_coverslip_is_an_aberration_and_the_designs_own_is_none():
 
     assert peak(170e-6) == pytest.approx(float(Objective(WAVE, 1.0, 1.33).intensity(0, 0, 0)), rel=1e-6)
     assert peak(190e-6) < 0.8 * peak(170e-6)
-
-
-@pytest.mark.parametrize("part", [0.5, 0.8, 0.9])
-def test_the_radius_of_a_part_of_the_light_is_that_of_airys_pattern(part):
-    r = Objective(WAVE, 0.05).radius_of(part, 0.0)
-    x = 2 * np.pi * 0.05 * r / WAVE
-    assert 1 - j0(x) ** 2 - j1(x) ** 2 == pytest.approx(part, abs=3e-3)
 
 
 @pytest.mark.parametrize(

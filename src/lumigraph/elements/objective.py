@@ -220,27 +220,6 @@ class Objective:
         wave = np.exp(1j * phase) * (scale / cosine)
         return np.stack([wave * a * _turned(h, angle) for h, _, a in _apodised(self, sine, cosine)])
 
-    def radius_of(self, part: float, dz: float) -> float:
-        """Radius that holds this part of the light [m], for a round image; from 0 to below 1."""
-        if self.model == "rays":
-            return abs(dz) * self.aperture / math.sqrt(self.medium**2 - self.aperture**2)
-        steps, density, reach = np.zeros(1), np.zeros(1), 4 * self.wavelength / self.numerical_aperture
-        reach += abs(dz) * self.aperture / math.sqrt(self.medium**2 - self.aperture**2)
-        for _ in range(12):
-            steps = np.linspace(
-                0, reach, max(256, math.ceil(reach * 24 * self.numerical_aperture / self.wavelength))
-            )
-            density = np.mean([self.intensity(steps * s, steps * c, dz) for s, c in _FOUR], axis=0)
-            rings = 2 * math.pi * steps * density * steps[1]
-            inside = np.cumsum(rings) - rings / 2
-            if inside[-1] >= part:
-                return float(np.interp(part, inside, steps))
-            reach *= 1.6
-        return reach
-
-
-_FOUR = ((0.0, 1.0), (1.0, 0.0), (math.sqrt(0.5), math.sqrt(0.5)), (math.sqrt(0.5), -math.sqrt(0.5)))
-
 
 def focus_intensity(objective: Objective, y: np.ndarray, x: np.ndarray, dz: float) -> np.ndarray:
     """Energy density (...) at (y, x, dz) where the objective focuses light polarised along x, 1 at the focus.

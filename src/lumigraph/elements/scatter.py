@@ -139,10 +139,6 @@ class Scatter:
         """True if some apertures are off the lattice."""
         return any(any(one.aside or ()) for one in self.own)
 
-    def in_row(self, i: int) -> "Scatter":
-        """Scatter of the lenslets of a row."""
-        return replace(self, own=tuple(one for one in self.own if one.index[0] == i))
-
     def naming(self, lenslets: Mapping[tuple[int, int], bool]) -> "Scatter":
         """Scatter that also lists these lenslets, with the apertures of those that are marked."""
         own = {one.index: one for one in self.own}
