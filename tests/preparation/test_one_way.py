@@ -14,7 +14,6 @@ from lumigraph.core.prepared import Reason
 from lumigraph.core.stack import Stack
 from lumigraph.deconvolution import Exposure
 from lumigraph.errors import CalibrationError, FormatError, SamplingWarning
-from lumigraph.preparation import given
 from lumigraph.preparation.given import read_pages
 
 PITCH, OFFSET = 12.4, 50.0
@@ -183,19 +182,3 @@ def test_a_raw_image_of_true_and_false_is_one_of_1_and_0(bench):
     bright = lg.open(bench / "raw.tiff").data > white.data.mean()
     views = [lg.decode(lg.prepare(one, calibrate(white))).data for one in (bright, bright.astype(np.uint8))]
     np.testing.assert_array_equal(*views)
-
-
-def test_frames_of_a_batch_share_one_finding_of_the_lattice_and_a_new_white_image_is_found_again(
-    bench, monkeypatch
-):
-    found = []
-    monkeypatch.setattr(given, "calibrate", lambda white: found.append(1) or calibrate(white))
-    files = given.Given(white=bench / "white.tiff", dark=bench / "dark.tiff")
-    raw = lg.open(bench / "raw.tiff")
-    for _ in range(3):
-        ready = files.prepared(raw)
-        assert "the lattice was found on the white image" in ready.notes
-    assert len(found) == 1
-    lg.save(lg.RawImage(lg.open(bench / "white.tiff").data * np.float32(0.9)), bench / "white.tiff")
-    files.prepared(raw)
-    assert len(found) == 2
