@@ -35,7 +35,7 @@ def fetched(array):
     return arrays.to_numpy(array.to_device(PROCESSOR))
 
 
-LONG = "2.0, round, in hexagons", "2.0, turned"
+LONG = "2.0, round, in hexagons", "2.0, turned", "2.0, out of focus and large"
 
 
 @pytest.mark.parametrize(

@@ -138,7 +138,9 @@ def test_images_behind_lenslets_of_three_kinds_are_those_of_points(given):
     assert off(found, points_image(camera(given), POINTS, 1e-3)) < 0.5e-2
 
 
-@pytest.mark.parametrize("given", [START, HEX], ids=["squares", "hexagons"])
+@pytest.mark.parametrize(
+    "given", [START, pytest.param(HEX, marks=pytest.mark.long)], ids=["squares", "hexagons"]
+)
 def test_images_behind_turned_lenslets_are_those_of_points_and_have_derivatives(given):
     turned = given | {"lenslets": given["lenslets"] | {"rotation": 0.03}}
     images = camera(turned).part_images([pair(turned, "lenslets.rotation")])
@@ -149,7 +151,12 @@ def test_images_behind_turned_lenslets_are_those_of_points_and_have_derivatives(
 
 @pytest.mark.parametrize(
     ("given", "keys"),
-    [(START, KEYS), (HEX, (*KEYS[:6], "lenslets.focal_length.1", "sensor.pixel_pitch"))],
+    [
+        (START, KEYS),
+        pytest.param(
+            HEX, (*KEYS[:6], "lenslets.focal_length.1", "sensor.pixel_pitch"), marks=pytest.mark.long
+        ),
+    ],
     ids=["squares", "hexagons"],
 )
 def test_the_gradient_is_the_derivatives_transpose(given, keys, rng):
@@ -169,7 +176,9 @@ def peak(run):
     return most
 
 
-@pytest.mark.parametrize(("given", "most"), [(START, 3), (HEX, 6)], ids=["squares", "hexagons"])
+@pytest.mark.parametrize(
+    ("given", "most"), [(START, 3), pytest.param(HEX, 6, marks=pytest.mark.long)], ids=["squares", "hexagons"]
+)
 def test_a_gradient_takes_few_times_the_memory_of_an_image(given, most, rng):
     images = camera(given).part_images([pair(given, key) for key in KEYS[1:6:2]])
     weights = rng.random(images.shape)

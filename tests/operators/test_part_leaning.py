@@ -46,8 +46,16 @@ def seen(built):
     return flat(optics, 1e-3).image(lambda one: points_image(one, POINTS, 1e-3))
 
 
-@pytest.mark.parametrize("still", [{}, STILL], ids=["upright", "leaning"])
-@pytest.mark.parametrize("key", MOVES)
+@pytest.mark.parametrize(
+    ("key", "still"),
+    [
+        pytest.param(
+            key, still, id=f"{key}-{'leaning' if still else 'upright'}",
+            marks=pytest.mark.long if still and key != "sensor_tilt" else (),
+        )
+        for key in MOVES for still in ({}, STILL)
+    ],
+)  # fmt: skip
 def test_images_change_with_a_tilt_as_simulations_do(key, still):
     """From -4 to 4 mrad; the simulations' distances are others, each camera's own."""
     pair = tuple(camera(moved(still, key, step)) for step in (-1e-5, 1e-5))

@@ -75,7 +75,7 @@ def test_the_gradient_is_the_derivatives_transpose(rng):
     assert images.gradient(POINTS, weights) @ change == pytest.approx(whole, rel=1e-9, abs=0)
 
 
-@pytest.mark.parametrize("name", ["depth", "lateral"])
+@pytest.mark.parametrize("name", [pytest.param("depth", marks=pytest.mark.long), "lateral"])
 def test_slopes_are_central_differences_of_bounds(name):
     """Of the same bounds, and of `bounds`, whose derivatives by place are differences of images."""
     where = {"depths": [-3 * mm, 2 * mm], "light": lg.information.Light(5000, 2), "places": 2}

@@ -92,7 +92,7 @@ def test_it_is_where_many_snapshots_go():
     assert errors[0] / errors[1] == pytest.approx(3, rel=0.25)
 
 
-@pytest.mark.parametrize("name", ["2.0", "1.0", "2.0, hexagonal"])
+@pytest.mark.parametrize("name", ["2.0", "1.0", pytest.param("2.0, hexagonal", marks=pytest.mark.long)])
 def test_an_even_scene_of_intensity_one_has_the_mean_of_the_magnification(name):
     """1 on the lenslets, and (1 + b/L)² times the area on the sensor; away from the array's border."""
     camera = CAMERAS[name]

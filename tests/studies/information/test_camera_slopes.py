@@ -89,7 +89,7 @@ def ends(given, key, step):
     [
         (TWO, KEYS, "depth"),
         (FREE, ("built.lenslet_distance",), "lateral"),
-        (HEX, ("lenslets.pitch", "lenslets.focal_length.1"), "lateral"),
+        pytest.param(HEX, ("lenslets.pitch", "lenslets.focal_length.1"), "lateral", marks=pytest.mark.long),
         (ONE, ("lenslets.pitch", "object_distance"), "brightness"),
         pytest.param(DIFFER, ("built.form_scatter",), "depth", marks=pytest.mark.long),
         pytest.param(

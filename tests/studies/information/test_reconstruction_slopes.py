@@ -74,7 +74,7 @@ def cut(one, depths, like=None):
     ("depths", "key", "value", "step"),
     [
         (ALONE, "object_distance", 120 * mm, 1e-4),
-        (ALONE, "pixel_pitch", 10 * um, 1e-3),
+        pytest.param(ALONE, "pixel_pitch", 10 * um, 1e-3, marks=pytest.mark.long),
         pytest.param(ALONE, "focal_length", 5.2 * mm, 1e-3, marks=pytest.mark.long),
         pytest.param(BOTH, "object_distance", 120 * mm, 1e-4, marks=pytest.mark.long),
         pytest.param(BOTH, "pixel_pitch", 10 * um, 1e-3, marks=pytest.mark.long),
