@@ -12,7 +12,9 @@ _SAMPLES = 8  # pixels that fall into one cell of the mean micro-image at least
 _CHUNK = 1 << 18  # pixels at a time: as many as a processor's cache holds
 _RIDGE = 1e-4
 _PHASES = 64  # of a pixel: on whole ones stand many micro-images of a picture, before they are shifted
-_FILLED = 0.7  # of the mean micro-image's samples: fewer leave steps between them, which the shift would follow
+_FILLED = (
+    0.7  # of the mean micro-image's samples: fewer leave steps between them, which the shift would follow
+)
 _FINE = 768  # samples of the mean micro-image that the nearest is taken of
 
 
