@@ -97,3 +97,19 @@ def test_a_tilt_and_a_radial_distortion_are_fitted():
     assert found.warp.radial == pytest.approx(warp.radial, rel=0.1)
     indices = np.stack(found.index(*true.T), -1)
     assert np.hypot(*(found.position(indices) - true).T).max() < 0.05
+
+
+@pytest.mark.parametrize("pitches", [(14.0, 14.0), (12.0, 13.5), (16.0, 18.0)])
+def test_a_pitch_of_whole_pixels_without_noise_has_true_centres(pitches):
+    """Their mean has steps between its samples, which the shift followed by up to 0.32 px."""
+    y, x = np.mgrid[:240, :260].astype(float)
+    away = [
+        np.abs((v - c + p / 2) % p - p / 2) for v, c, p in ((y, 120.3, pitches[0]), (x, 130.7, pitches[1]))
+    ]
+    white = np.prod(
+        [1 / (1 + np.exp((v - 0.43 * p) / 0.8)) for v, p in zip(away, pitches, strict=True)], axis=0
+    )
+    found = lg.calibrate(lg.RawImage(white))
+    place = found.position(found.indices) - (120.3, 130.7)
+    off = (place + np.array(pitches) / 2) % pitches - np.array(pitches) / 2
+    assert np.abs(off).max() < 0.02

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks import references
 
 import cameras
 import lumigraph as lg
-from benchmarks import references
 from lumigraph.core.grid import Grid
 from lumigraph.elements.surface import GlassSurface
 from lumigraph.elements.tilt import TiltAndBow

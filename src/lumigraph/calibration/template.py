@@ -12,6 +12,9 @@ _SAMPLES = 8  # pixels that fall into one cell of the mean micro-image at least
 _CHUNK = 1 << 18  # pixels at a time: as many as a processor's cache holds
 _RIDGE = 1e-4
 _PHASES = 64  # of a pixel: on whole ones stand many micro-images of a picture, before they are shifted
+_FILLED = (
+    0.7  # of the mean micro-image's samples: fewer leave steps between them, which the shift would follow
+)
 _FINE = 768  # samples of the mean micro-image that the nearest is taken of
 
 
@@ -20,7 +23,8 @@ def sharpened(picture: np.ndarray, spots: Spots, model: Calibration) -> Spots:
 
     The mean of all micro-images, made symmetric about its centre, is fitted to each: I = (a + b·d) T(d) -
     s·∇T(d) over its cell, for brightness a, vignetting b and shift s. Dust, gaps and noise count only by what
-    they do to the edges.
+    they do to the edges. Where all micro-images lie alike between the pixels, as behind a pitch of whole
+    pixels without noise, their mean is no finer than one of them, and the spots stay as they are.
 
     Parameters
     ----------
@@ -31,7 +35,10 @@ def sharpened(picture: np.ndarray, spots: Spots, model: Calibration) -> Spots:
     model
         Lattice through them.
     """
-    tables = _tables(mean_cell(picture, model, symmetric=True), model)
+    mean, filled = _mean_and_filled(picture, model)
+    if filled < _FILLED:
+        return spots
+    tables = _tables((mean + np.roll(mean[::-1, ::-1], 1, (0, 1))) / 2, model)
     start = model.position(spots.indices)
     if len(start) > _PHASES**2:
         start = np.rint(start * _PHASES) / _PHASES
@@ -41,8 +48,13 @@ def sharpened(picture: np.ndarray, spots: Spots, model: Calibration) -> Spots:
     return spots._replace(centers=np.where(good[:, None], centers, spots.centers))
 
 
-def mean_cell(picture: np.ndarray, model: Calibration, *, symmetric: bool = False) -> np.ndarray:
+def mean_cell(picture: np.ndarray, model: Calibration) -> np.ndarray:
     """Mean of all micro-images in coordinates of the lattice's cell (m, m), its centre first."""
+    return _mean_and_filled(picture, model)[0]
+
+
+def _mean_and_filled(picture: np.ndarray, model: Calibration) -> tuple[np.ndarray, float]:
+    """The mean of all micro-images (m, m), and the part of its samples on which pixels lie."""
     lattice, (ny, nx) = model.lattice, picture.shape
     count = ny * nx
     size = int(np.clip(math.sqrt(count / _SAMPLES), 8, min(192, 4 * min(lattice.pitches))))
@@ -58,10 +70,7 @@ def mean_cell(picture: np.ndarray, model: Calibration, *, symmetric: bool = Fals
         light += np.bincount(place, picture[first : first + rows].ravel(), size * size)
         weight += np.bincount(place, minlength=size * size)
     blurred = [ndimage.gaussian_filter(a.reshape(size, size), 0.6, mode="wrap") for a in (light, weight)]
-    cell = blurred[0] / np.maximum(blurred[1], 1e-3)
-    if symmetric:
-        cell = (cell + np.roll(cell[::-1, ::-1], 1, (0, 1))) / 2
-    return cell
+    return blurred[0] / np.maximum(blurred[1], 1e-3), np.count_nonzero(weight) / len(weight)
 
 
 def _tables(mean: np.ndarray, model: Calibration) -> np.ndarray:

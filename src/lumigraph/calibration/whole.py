@@ -107,10 +107,15 @@ def _likelier(
     _check_size(last, shape)
     found = _followed(original, flat, gaps, last)
     if last.layout == "rectangular" and not found.white:
+        spread = _spread(found.fitted)
+        why = (
+            f"its micro-images are {spread:.2f} px off it, where {_CLEAR:g} px are allowed"
+            if spread > _CLEAR
+            else "only the gaps between its micro-images were found, not their light"
+        )
         raise CalibrationError(
             f"the likeliest lattice is rectangular, of pitches {np.hypot(*last.column):.2f} x "
-            f"{np.hypot(*last.row):.2f} px, but its micro-images are {_spread(found.fitted):.2f} px off it, "
-            f"where {_CLEAR:g} px are allowed. Take a white image."
+            f"{np.hypot(*last.row):.2f} px, but {why}. Take a white image."
         )
     return found
 

@@ -55,7 +55,7 @@ def undersampled(field: Field) -> str | None:
         share = _turning_fast(steps)
         if share > UNDERSAMPLED:
             return (
-                f"the field is sampled too coarsely along {name}: {100 * share:.2g} % of its light turns by "
+                f"the field is sampled too coarsely along {name}: {100 * share:.3g} % of its light turns by "
                 f"{NEARLY_HALF_A_TURN:g} of half a turn or more from sample to sample, "
                 f"{field.grid.pitch[axis]:.4g} m apart, and what turns faster looks as if it turned the "
                 "other way. Use a finer pitch."
