@@ -130,8 +130,8 @@ def viewer() -> None:
 
 
 STATES = {
-    "viewer-tilt.png": "#focus=0.98&tilt=-0.34,0",
-    "viewer-sharp.png": "#sharpen=2",
+    "viewer-tilt.png": "#focus=1.1807&tilt=-0.588,0",
+    "viewer-sharp.png": "#sharpen=1.2",
     "viewer-depth.png": "#mode=depth&map=viridis",
 }
 """Links of the viewer: the floor in focus from front to back, what is in focus sharpened, depth."""

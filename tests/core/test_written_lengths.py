@@ -61,3 +61,28 @@ def test_a_camera_with_a_pitch_of_millimetres_names_its_key():
     table["lenslets"]["pitch"] = "150 mm"
     with pytest.raises(lg.GeometryError, match=r"pixels.*Check lenslets\.pitch \(150 mm\)"):
         lg.PlenopticCamera.from_table(table, "camera.toml").describe()
+
+
+def test_points_and_planes_are_written_with_units():
+    points = lg.targets.points([("0 mm", "1 mm", "5 mm"), (0, 2e-3)]).parts[0]
+    np.testing.assert_allclose(points.positions, [[0, 1e-3, 5e-3], [0, 2e-3, 0]])
+    volume = lg.Volume(np.ones((2, 4, 4)), lg.Grid((4, 4), "1 um"), ("0 um", "1 um"))
+    assert volume.depths == (0.0, 1e-6)
+    with pytest.raises(lg.GeometryError, match="point 0 is '1 parsec' but must be"):
+        lg.targets.points([("0 mm", "1 parsec")])
+
+
+def test_files_of_cameras_and_calibrations_stand_for_them(tmp_path):
+    camera = lg.load_camera("thesis-plenoptic-1").replace(lenslets={"count": (5, 5)})
+    (tmp_path / "camera.toml").write_text(camera.to_toml())
+    lg.save(camera.calibration, tmp_path / "calibration.toml")
+    raw = lg.RawImage(np.ones(camera.calibration.shape))
+    for path in (tmp_path / "calibration.toml", str(tmp_path / "calibration.toml")):
+        np.testing.assert_array_equal(lg.decode(raw, path).data, lg.decode(raw, camera.calibration).data)
+    assert lg.plots.layout(tmp_path / "camera.toml").axes
+    with pytest.raises(lg.FormatError, match="describes a 'plenoptic', not a calibration"):
+        lg.decode(raw, tmp_path / "camera.toml")
+    with pytest.raises(
+        lg.GeometryError, match=r"must be a LightField\. Read the file first, with lumigraph\.open"
+    ):
+        lg.refocus("views.zarr", 1)

@@ -81,7 +81,7 @@ def calibrate(
     bench: CameraOptions = CameraOptions(),
     common: ReportOptions = REPORTED,
 ) -> Result:
-    """Find the micro-images on a white image, or on a raw image alone, and write their lattice.
+    """Find the micro-images of a microlens array (MLA) on a white image (flat-field), or on raw images alone.
 
     Example: `lumigraph calibrate white.png -o calibration.toml --overlay lattice.png`
 

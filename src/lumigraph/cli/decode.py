@@ -67,7 +67,7 @@ def decode(
     sampling: SamplingOptions = SamplingOptions(),
     common: ReportOptions = REPORTED,
 ) -> Result:
-    """Decode a raw image of a plenoptic camera 1.0 into views.
+    """Decode a raw image of a plenoptic camera 1.0 into views (sub-aperture images).
 
     Example: `lumigraph decode raw.png --white white.png -o views.zarr`
 

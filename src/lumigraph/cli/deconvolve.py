@@ -48,8 +48,8 @@ def deconvolve(
 ) -> Result:
     """Reconstruct what was in front of a microscope or a camera from raw images, or a time series.
 
-    A light-field microscope gives a volume, a focused camera the picture of its main lens, or one for each
-    of several depths. The object is followed as far beyond the picture as light comes from, and cut
+    By the camera's point spread functions (PSF). A light-field microscope gives a volume, a focused camera
+    the picture of its main lens, or one for each of several depths. The object is followed as far beyond the picture as light comes from, and cut
     afterwards. Ctrl-C writes what was reached. Several files are raw images of one object, deconvolved
     together; several pages of one file are a time series, deconvolved one after the other.
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from numbers import Real
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -112,15 +113,16 @@ def choice(
 def instance(name: str, value: Any, kind: type, error: type[LumigraphError] = GeometryError) -> None:
     """Refuse a value of another class, such as an array where a `Grid` is needed."""
     if not isinstance(value, kind):
-        raise error(f"{name} is of type {type(value).__name__} but must be a {kind.__name__}.")
+        read = " Read the file first, with lumigraph.open." if isinstance(value, str | PathLike) else ""
+        raise error(f"{name} is of type {type(value).__name__} but must be a {kind.__name__}.{read}")
 
 
 def array(name: str, value: Any, error: type[LumigraphError] = GeometryError) -> None:
     """Refuse what is not an array of numbers: lists, scalars, text, objects; of any array library."""
     if not hasattr(value, "shape") or not hasattr(value, "dtype"):
-        raise error(
-            f"{name} is of type {type(value).__name__} but must be an array. Use numpy.asarray(...) first."
-        )
+        path = isinstance(value, str | PathLike)
+        remedy = "Read the file with lumigraph.open" if path else "Use numpy.asarray(...)"
+        raise error(f"{name} is of type {type(value).__name__} but must be an array. {remedy} first.")
     if isinstance(value, np.ndarray | np.generic) and value.dtype.kind not in "biufc":
         raise error(f"{name} holds {value.dtype} but must hold numbers. Use astype(float) first.")
 

@@ -55,7 +55,8 @@ class Volume(Noun[A]):
     def __post_init__(self) -> None:
         checks.array("data", self.data)
         checks.instance("grid", self.grid, Grid)
-        depths = np.atleast_1d(np.asarray(self.depths, np.float64))
+        given = np.atleast_1d(self.depths).ravel().tolist()
+        depths = np.array([checks.finite("depths", z) if isinstance(z, str) else z for z in given], float)
         object.__setattr__(self, "depths", tuple(float(dz) for dz in depths.ravel()))
         shape = tuple(self.data.shape)
         if len(shape) not in (3, 4) or shape[:3] != depths.shape + self.grid.shape:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from os import PathLike
 from typing import Any, Protocol
 
 import numpy as np
@@ -9,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Rectangle
 
+from lumigraph.core import upper_floors
 from lumigraph.design.layout import Layout, LensletLayout, MicroscopeLayout
 from lumigraph.errors import GeometryError
 from lumigraph.plots import glass_layout, microscope_layout
@@ -29,7 +31,7 @@ class DrawnCamera(Protocol):
         ...
 
 
-def layout(camera: DrawnCamera) -> Figure:
+def layout(camera: DrawnCamera | str | PathLike[str]) -> Figure:
     """Ray diagram of a camera: object, main lens with its stop, lenslets and sensor, distances labelled.
 
     The upper panel shows the whole camera, the lower one the lenslets and the sensor. Distances along the
@@ -40,7 +42,7 @@ def layout(camera: DrawnCamera) -> Figure:
     Parameters
     ----------
     camera
-        Any camera or microscope of `lumigraph.instruments`.
+        Any camera or microscope of `lumigraph.instruments`, its file or its name in the catalogue.
 
     Raises
     ------
@@ -51,6 +53,7 @@ def layout(camera: DrawnCamera) -> Figure:
     --------
     ``lumigraph.plots.layout(camera).savefig("layout.png")``
     """
+    camera = upper_floors.camera(camera)
     drawn = camera.layout()
     if isinstance(drawn, MicroscopeLayout):
         return _microscope(drawn)

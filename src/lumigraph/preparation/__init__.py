@@ -7,12 +7,13 @@
 - `agreement`: what a picture says about the camera that its file describes
 - `vignetting`: how much light reaches each micro-image
 - `beside`: the pictures that come with a raw image
-- `given`: the files that come with a raw image
+- `given`, `calibration_file`: the files that come with a raw image
 """
 
 from lumigraph.core.prepared import PreparedImage
+from lumigraph.preparation.calibration_file import read_calibration
 from lumigraph.preparation.drift import drift
-from lumigraph.preparation.given import read_calibration, sharp_kinds
+from lumigraph.preparation.given import sharp_kinds
 from lumigraph.preparation.prepare import decode, prepare, render, render_stack, super_resolve
 from lumigraph.preparation.vignetting import vignetting
 

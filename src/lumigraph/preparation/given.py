@@ -18,13 +18,12 @@ from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
 from lumigraph.io.raytrix import lens_types
 from lumigraph.preparation.beside import ReferenceImages
+from lumigraph.preparation.calibration_file import read_calibration
 from lumigraph.preparation.doubts import check_kinds
 from lumigraph.preparation.prepare import prepare
 from lumigraph.rendering import sharp_patches
 
 Kind = TypeVar("Kind")
-
-_MAKERS = (".xml", ".ini")  # which do not say how large their raw images are
 
 
 @dataclass(frozen=True)
@@ -171,26 +170,6 @@ def _range(pages: str, count: int, path: Path, *, one: bool) -> range:
     if not found or found[0] < 0 or found[-1] >= count:
         forms = "one of them" if one else "one, some as '0:3' or '0-3', or 'all'"
         raise FormatError(f"--page is {pages!r} but {path} has pages 0 to {count - 1}. Give {forms}.")
-    return found
-
-
-def read_calibration(path: Path, shape: tuple[int, int] | None = None) -> Calibration:
-    """A calibration: our own, or one by a camera's maker, which needs the raw images' shape.
-
-    Raises
-    ------
-    FormatError
-        Another kind of file.
-    """
-    ending = path.suffix.lower()
-    if ending in _MAKERS:
-        found = io.open(path, shape=shape)
-    elif ending in (".lfp", ".lfr", ".lfx"):
-        found = io.open(path, what="calibration")
-    else:
-        found = io.open(path)
-    if not isinstance(found, Calibration):
-        raise FormatError(f"{path} holds a {called(found)} where a calibration is needed.")
     return found
 
 

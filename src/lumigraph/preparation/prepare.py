@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
 from os import PathLike
+from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
 import numpy as np
@@ -21,6 +22,7 @@ from lumigraph.core.saturation import saturation_level
 from lumigraph.errors import CalibrationError, SamplingWarning
 from lumigraph.preparation.agreement import Described, implied
 from lumigraph.preparation.beside import ReferenceImages, above, black_plane, coloured
+from lumigraph.preparation.calibration_file import read_calibration
 from lumigraph.preparation.doubts import check_kinds, doubts_of, floor_under
 from lumigraph.preparation.drift import check_drift
 from lumigraph.preparation.validity import pixel_reasons, verdicts
@@ -33,7 +35,7 @@ Seen = TypeVar("Seen", covariant=True)
 
 def prepare(
     raw: RawImage | Array,
-    calibration: Calibration | None = None,
+    calibration: Calibration | str | PathLike[str] | None = None,
     *,
     white: RawImage | Array | None = None,
     dark: RawImage | Array | None = None,
@@ -52,7 +54,7 @@ def prepare(
     raw
         Raw image as it was read (y, x[, c]).
     calibration
-        Calibration of the micro-images.
+        Calibration of the micro-images, or its file.
     white
         Picture of an evenly lit surface with the same settings.
     dark
@@ -92,6 +94,7 @@ def prepare(
     (True, 'the lattice is that of the camera file')
     """
     camera = upper_floors.camera(camera)
+    calibration = _read(calibration, raw)
     beside = ReferenceImages(*(None if one is None else as_raw(one) for one in (white, dark)))
     raw = as_raw(raw)
     beside.check(raw)
@@ -113,6 +116,13 @@ def prepare(
     else:
         ready, known = raw, known | _modelled(raw, beside, found)
     return PreparedImage(ready.data, ready.pixel_pitch, ready.bit_depth, ready.bayer, ready.metadata, **known)
+
+
+def _read(calibration: Calibration | str | PathLike[str] | None, raw: RawImage | Array) -> Calibration | None:
+    """The calibration, of its file where that is given."""
+    if isinstance(calibration, str | PathLike):
+        return read_calibration(Path(calibration), as_raw(raw).shape)
+    return calibration
 
 
 def _placed(
@@ -230,7 +240,7 @@ class RawFunction(Protocol[Options, Seen]):
     """A function of a raw image, prepared or not, whose calibration may be left out."""
 
     def __call__(
-        self, raw: RawImage | Array, calibration: Calibration | None = None,
+        self, raw: RawImage | Array, calibration: Calibration | str | PathLike[str] | None = None,
         *args: Options.args, **options: Options.kwargs,
     ) -> Seen:  # fmt: skip
         """Result of the function for the raw image."""
@@ -247,9 +257,10 @@ def of_raw(
 
     @wraps(function)
     def call(
-        raw: RawImage | Array, calibration: Calibration | None = None,
+        raw: RawImage | Array, calibration: Calibration | str | PathLike[str] | None = None,
         *args: Options.args, **options: Options.kwargs,
     ) -> Made:  # fmt: skip
+        calibration = _read(calibration, raw)
         if not isinstance(raw, PreparedImage):
             raw = prepare(raw, calibration)
             calibration = raw.calibration

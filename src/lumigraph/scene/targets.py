@@ -306,7 +306,8 @@ def points(positions: Sequence[Sequence[float]], intensities: Sequence[float] | 
     Parameters
     ----------
     positions
-        (y, x) or (y, x, dz) of each [m]; dz from the focused plane, positive farther from the camera.
+        (y, x) or (y, x, dz) of each [m], or text with a unit; dz from the focused plane, positive farther
+        from the camera.
     intensities
         Intensity of each; None for 1.
 
@@ -328,7 +329,8 @@ def points(positions: Sequence[Sequence[float]], intensities: Sequence[float] | 
             raise GeometryError(f"point {number} is {position!r} but must be (y, x) or (y, x, dz).")
         if len(position) not in (2, 3):
             raise GeometryError(f"point {number} has {len(position)} numbers but needs (y, x) or (y, x, dz).")
-        rows.append((*position, 0.0)[:3])
+        places = [checks.finite(f"point {number}", one) if isinstance(one, str) else one for one in position]
+        rows.append((*places, 0.0)[:3])
     weights = np.ones(len(rows)) if intensities is None else intensities
     return Scene([Points(rows or np.zeros((0, 3)), weights)])  # type: ignore[arg-type]
 

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 
 import numpy as np
 
-from lumigraph.core import checks
+from lumigraph.core import checks, upper_floors
 from lumigraph.core.calibration import Calibration
 from lumigraph.core.grid import Grid
 from lumigraph.core.joint import Joint
@@ -64,7 +65,7 @@ def scan(steps: int, period: float | Sequence[float]) -> np.ndarray:
 
 
 def joint_operator(
-    cameras: Instrument | Sequence[Instrument],
+    cameras: Instrument | Sequence[Instrument] | str | PathLike[str],
     depths: Sequence[float] | None = None,
     samples_per_lenslet: int | None = None,
     *,
@@ -111,6 +112,7 @@ def joint_operator(
     --------
     ``lg.deconvolve(raws, lg.joint_operator(camera, shifts=shifts))``
     """
+    cameras = upper_floors.camera(cameras)
     moved = pairs_of(shifts, None if isinstance(cameras, Instrument) else len(cameras))
     some = [cameras] * len(moved) if isinstance(cameras, Instrument) else list(cameras)
     for camera in some:

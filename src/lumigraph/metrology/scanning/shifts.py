@@ -11,9 +11,11 @@ K. V. Mardia & R. J. Marshall, Biometrika 71, 135 (1984), for likelihoods of fie
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from os import PathLike
 
 import numpy as np
 
+from lumigraph.core import upper_floors
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
 from lumigraph.core.short_repr import brief
@@ -91,7 +93,7 @@ class FoundShifts:
 
 def find_shifts(
     raws: Sequence[RawImage],
-    camera: Instrument,
+    camera: Instrument | str | PathLike[str],
     start: Sequence[Sequence[float]] | np.ndarray | None = None,
     *,
     exposure: Exposure | Sequence[Exposure] | None = None,
@@ -138,7 +140,7 @@ def find_shifts(
     >>> found = lg.find_shifts(raws, camera, lg.scan(3, camera.lenslet_size))  # doctest: +SKIP
     >>> picture = lg.deconvolve(raws, lg.joint_operator(camera, shifts=found.shifts))  # doctest: +SKIP
     """
-    of = _gathering(camera)
+    of = _gathering(upper_floors.camera(camera))
     if not isinstance(raws, list | tuple) or len(raws) < 2:
         raise CalibrationError("shifts are between raw images. Give a list of two or more.")
     begun = np.array(pairs_of([(0.0, 0.0)] * len(raws) if start is None else start, len(raws)))

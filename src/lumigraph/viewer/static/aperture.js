@@ -73,12 +73,12 @@ export function planeFrom(plane, origin, factor) {
   return { corner: alphaAt(plane, origin), slope: plane.slope.map((s) => s * factor) };
 }
 
-/** The most that the plane may lean (down, across): what the focus spans, and less than what folds the outermost views. */
+/** The most that the plane may lean (down, across): twice what the focus spans, which a floor takes, and less than what folds the outermost views. */
 export function tiltLimits(views) {
   const [low, high] = views.focus;
   return [0, 1].map((k) => {
     const { first, step } = viewShifts(views, 0, k), n = views.shape[2 + k], most = Math.max(Math.abs(first), Math.abs(first + (views.shape[k] - 1) * step));
-    return n > 1 ? Math.min(high - low, (0.9 * (n - 1)) / Math.max(most, 1e-9)) : 0;
+    return n > 1 ? Math.min(2 * (high - low), (0.9 * (n - 1)) / Math.max(most, 1e-9)) : 0;
   });
 }
 
