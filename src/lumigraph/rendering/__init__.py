@@ -6,6 +6,7 @@
 - `arrangement`: views whose numbers do not say where they stand
 - `refocus`, `fourier_slice`, `sharp`, `focus_range`, `detail`: refocused pictures; one that is focused
   everywhere; how finely they are sampled
+- `low_pass`: a picture without the seams of its patches
 - `focused`, `patches`, `kinds`, `super_resolution`: plenoptic 2.0 pictures, of patches of one size or many
 - `geometry`, `interpolate`: lengths in metres, rectangles of lenslets; values between samples
 """
@@ -17,6 +18,7 @@ from lumigraph.rendering.encode import encode
 from lumigraph.rendering.focused import render, render_stack, sight_grid
 from lumigraph.rendering.fourier_slice import refocus_fourier
 from lumigraph.rendering.kinds import match_kinds
+from lumigraph.rendering.low_pass import low_pass
 from lumigraph.rendering.patches import lenslet_indices, sharp_patches
 from lumigraph.rendering.paths import view_path
 from lumigraph.rendering.pixels import hot_pixels
@@ -41,6 +43,7 @@ __all__ = [
     "finer",
     "hot_pixels",
     "lenslet_indices",
+    "low_pass",
     "match_kinds",
     "point_of_view",
     "reduce_aperture",

@@ -3,14 +3,13 @@
 import math
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from lumigraph.analysis import contrast
 from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
 from lumigraph.design.plenoptic2 import rendered_cutoff
 from lumigraph.plots.curves import curves, images
-from lumigraph.rendering import render
+from lumigraph.rendering import low_pass, render
 from lumigraph.rendering.focused import rendered_grid
 from lumigraph.scene.targets import THESIS_FREQUENCIES
 from lumigraph.studies.thesis.figures.periodic import LinedCamera, line_spread
@@ -89,16 +88,13 @@ class _Grating:
 
     @property
     def filtered(self) -> np.ndarray:
-        return _low_pass(self.picture, self.grid.pitch[1])
+        return low_pass(self.picture, self.grid.pitch[1], FILTER)
 
     @property
     def filtered_contrast(self) -> float:
-        return contrast(1 + _low_pass(self.wave, self.grid.pitch[1]), self.frequency, self.grid.pitch[1])
-
-
-def _low_pass(profile: np.ndarray, pitch: float) -> np.ndarray:
-    """Profile times exp(-f²/2σ²) in its spectrum."""
-    return gaussian_filter1d(profile, 1 / (2 * math.pi * FILTER * pitch), truncate=6.0)
+        return contrast(
+            1 + low_pass(self.wave, self.grid.pitch[1], FILTER), self.frequency, self.grid.pitch[1]
+        )
 
 
 def _ideal(frequency: float, m: float) -> tuple[float, float]:
@@ -150,7 +146,7 @@ def _rows(gratings: list[_Grating], m: float) -> list[ResultRow]:
         ResultRow(f"seams, rms of an even scene, m = {m:g}", float(second.even.std() / second.even.mean())),
         ResultRow(
             f"seams after the filter, rms, m = {m:g}",
-            float(_low_pass(second.even, second.grid.pitch[1])[20:-20].std() / second.even.mean()),
+            float(low_pass(second.even, second.grid.pitch[1], FILTER)[20:-20].std() / second.even.mean()),
         ),
     ]
 
