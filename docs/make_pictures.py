@@ -152,6 +152,34 @@ def designer() -> None:
     screenshot(["design", "thesis-plenoptic-2-m050", "--web"], "designer.png")
 
 
+def laboratory() -> None:
+    """White, raw and rendered images of the thesis' bench, a part of its array: laboratory-*.png."""
+    whole = lg.load_camera("thesis-prototype")
+    meant = whole.replace(lenslets={"count": (17, 13)}, sensor={"pixel_pitch": "3.34 um", "shape": None})
+    shape, light = meant.sensor.shape, lg.Incoherent(1e-2)
+    turned = meant.replace(lenslets={"rotation": "1.5 deg"}, sensor={"shape": shape})
+    closed = meant.replace(main_lens={"diameter": 0.7 * meant.pupil_diameter})
+    whites = [(turned, "turned by 1.5°"), (closed, "aperture too small"), (meant, "as meant: they touch")]
+    row([(_bright(lg.simulate(each, lg.targets.white(), light)), what) for each, what in whites],
+        "laboratory-white.png", 2.0)  # fmt: skip
+    raws, pictures = [], []
+    for m in (0.5, 0.25):
+        camera = meant.replace(lenslets={"magnification": m})
+        raw = lg.simulate(camera, lg.targets.usaf1951(camera.object_grid, 3), light)
+        white = lg.simulate(camera, lg.targets.white(), light)
+        even = lg.render(white, camera.calibration, camera.patch)
+        picture = lg.render(raw, camera.calibration, camera.patch) / np.maximum(even, 0.05 * even.max())
+        raws.append((_bright(raw), f"raw, m = {m:g}"))
+        pictures.append((np.clip(picture / np.quantile(picture, 0.995), 0, 1), f"rendered, m = {m:g}"))
+    row(raws, "laboratory-raw.png", 2.6)
+    row(pictures, "laboratory-rendered.png", 2.6)
+
+
+def _bright(raw: lg.RawImage) -> np.ndarray:
+    data = np.asarray(raw.data)
+    return np.clip(data / np.quantile(data, 0.995), 0, 1)
+
+
 _IDLE = "!window.lumigraph || (lumigraph.ready && !document.getElementById('status').textContent)"
 
 
@@ -179,7 +207,7 @@ def screenshot(command: list[str], name: str, link: str = "") -> None:
             server.terminate()
 
 
-PICTURES = (first, bench, calibration, microscope, design, viewer, states, designer)
+PICTURES = (first, bench, laboratory, calibration, microscope, design, viewer, states, designer)
 
 
 if __name__ == "__main__":

@@ -64,7 +64,7 @@ def _overview(
 
 
 def counted(results: Sequence[StoredResult]) -> str:
-    """How many rows prove what, in a sentence."""
+    """Sentence that says how many rows prove what."""
     found = kinds(results)
     return (
         f"{sum(found.values())} rows: {found['waves']} proven by waves, {found['closed form']} closed forms "

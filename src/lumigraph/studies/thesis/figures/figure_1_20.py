@@ -16,7 +16,7 @@ MAGNIFICATIONS = (1.0, 0.5, 0.3, 0.25, 0.1)
 _REACH = 7  # lenslets about the middle: 15 hold the ten that see a point at m = 0.1
 # How far the spread of light over the lenslets may be from 1/m: the edge of the main lens' shadow is blurred
 # by sqrt(λ a), 0.55 lenslets at m = 1 and 1.3 at m = 0.1.
-_TOLERANCE = {0.5: 0.3, 0.3: 0.15, 0.25: 0.15, 0.1: 0.3}
+_TOLERANCE = {0.5: 0.3, 0.3: 0.1, 0.25: 0.1, 0.1: 0.3}
 
 
 @experiment(

@@ -14,7 +14,8 @@ COUNT = 350
 """Snapshots after which the thesis finds no gain."""
 STEP = 50
 """Snapshots of one part, which an interrupted run keeps."""
-QUICK_MASKS = 50
+QUICK_MASKS, MASKS = 50, 150
+"""Snapshots of masks: their bias and their speckle are told apart, and give the error of any number."""
 
 WHY = (
     "White phases, one for each sample, converge to the exact incoherent image as 1/sqrt(M), without an "
@@ -35,7 +36,7 @@ def run(context: Context) -> ExperimentOutcome:
     index = round(coherence.INCOHERENCE * imager.samples)
     few = {"5 snapshots": _sum(imager, coherence.masked(index), 5, 0).sum(0)}
     white = _parts(context, imager, "white", COUNT)
-    masks = _parts(context, imager, "masks", QUICK_MASKS if context.quick else COUNT)
+    masks = _parts(context, imager, "masks", QUICK_MASKS if context.quick else MASKS)
     counts = STEP * np.arange(1, len(white) + 1)
     errors = {name: _errors(parts, imager.reference) for name, parts in (("white", white), ("masks", masks))}
     found = coherence.Errors.of(masks.sum(0), STEP * len(masks), imager.reference)

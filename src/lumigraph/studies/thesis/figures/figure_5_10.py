@@ -36,7 +36,7 @@ def run(context: Context) -> ExperimentOutcome:
     inside = encircled_energy(image, middle, right / 2, (0.0, 0.0)) * window
     rows = (
         ResultRow(
-            "central lobe", lobe * 1e6, "µm", 2.44 * alone.wavelength * f_number * 1e6, right * 1e6, 0.4
+            "central lobe", lobe * 1e6, "µm", 2.44 * alone.wavelength * f_number * 1e6, right * 1e6, 0.2
         ),
         ResultRow(
             "light in the central lobe",
@@ -44,7 +44,7 @@ def run(context: Context) -> ExperimentOutcome:
             "",
             0.9,
             1 - _outside(_ZERO),
-            0.004,
+            0.002,
             "1 - J0²(3.83) - J1²(3.83), less what falls beside the sensor",
         ),
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lumigraph.core.cache import remembered
 from lumigraph.core.grid import Grid
 from lumigraph.core.raw import RawImage
 from lumigraph.instruments import FocusedPlenopticCamera, SingleLensCamera
@@ -103,3 +104,9 @@ class PointRendering:
         ny, nx = data.shape
         part = data[ny // 2 - half : ny // 2 + half + 1, nx // 2 - half : nx // 2 + half + 1]
         return part, Grid.square(2 * half + 1, pixel / abs(m))
+
+
+@remembered
+def on_axis(magnification: float, lenslets: int) -> PointRendering:
+    """A point on the axis of the thesis' camera, which Tables 5.3 and 5.4 measure."""
+    return PointRendering.of(camera(magnification, lenslets))

@@ -29,7 +29,7 @@ def run(context: Context) -> ExperimentOutcome:
         for name, value, printed, exact in zip(
             ("a", "b", "main lens D"), values, _PRINTED[m], _EXACT[m], strict=True
         ):
-            rows.append(ResultRow(f"{name}, m = {m:g}", value * 1e3, "mm", printed, exact, 0.01))
+            rows.append(ResultRow(f"{name}, m = {m:g}", value * 1e3, "mm", printed, exact, 0.001))
     return ExperimentOutcome(
         closed_forms(rows),
         why="The thesis rounds to 0.1 mm. Table 5.1 prints lenslets of 5.3 mm; Table 5.2 belongs to 5.2 mm.",

@@ -5,7 +5,7 @@ import numpy as np
 from lumigraph.analysis import cutoff, mtf
 from lumigraph.design import plenoptic2, resolution
 from lumigraph.plots.curves import curves
-from lumigraph.studies.thesis.figures.point_images import MAGNIFICATIONS, PointRendering, camera
+from lumigraph.studies.thesis.figures.point_images import MAGNIFICATIONS, PointRendering, on_axis
 from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
 
 _PRINTED = {0.5: (3.0e4, 1.0e4), 0.3: (3.5e4, 0.76e4), 0.25: (3.6e4, 0.63e4)}
@@ -27,7 +27,7 @@ def run(context: Context) -> ExperimentOutcome:
     figures = []
     for number, m in enumerate(MAGNIFICATIONS):
         context.progress(number / 3, f"MTF, m = {m:g}")
-        point = PointRendering.of(camera(m, 13 if context.quick else 39))
+        point = on_axis(m, 13 if context.quick else 39)
         part, grid = point.micro_image
         transfer = {
             "main lens": mtf(point.main, point.main_grid.pitch[1]),
