@@ -8,7 +8,7 @@ from lumigraph import plots, report
 from lumigraph.instruments import load_camera
 from lumigraph.report.pictures import Picture, picture
 from lumigraph.studies.thesis.registry import Experiment, ResultRow
-from lumigraph.studies.thesis.run import StoredResult, kinds
+from lumigraph.studies.thesis.run import StoredResult, compact, kinds
 
 INTRODUCTION = """
 Every table and figure of the thesis that lumigraph started from, computed again. "Thesis" is what is printed
@@ -38,8 +38,9 @@ def write_report(
     """
     page = report.Page("The thesis, reproduced", INTRODUCTION)
     _overview(page, chosen, results, quick)
+    drawn: dict[str, str] = {}
     for one, result in zip(chosen, results, strict=True):
-        _section(page.section(f"{one.id}: {one.title}"), one, result)
+        _section(page.section(f"{one.id}: {one.title}"), one, result, drawn)
     page.write(path)
 
 
@@ -72,10 +73,14 @@ def counted(results: Sequence[StoredResult]) -> str:
     )
 
 
-def _section(section: report.Section, one: Experiment, result: StoredResult) -> None:
+def _section(section: report.Section, one: Experiment, result: StoredResult, drawn: dict[str, str]) -> None:
+    """Question, set-up, pictures and rows; each camera is drawn once, where it comes first."""
     section.text(one.question)
-    if one.camera:
+    if one.camera in drawn:
+        section.text(f"The set-up is the camera {one.camera}, drawn under {drawn[one.camera]}.")
+    elif one.camera:
         section.parts.append(_drawn(one.camera))
+        drawn[one.camera] = one.id
     section.text(f"In the thesis: {one.thesis}.")
     section.parts += result.pictures
     section.table([cells(row) for row in result.rows], header=HEADER)
@@ -88,7 +93,7 @@ def _section(section: report.Section, one: Experiment, result: StoredResult) -> 
 @cache
 def _drawn(camera: str) -> Picture:
     caption = f"The set-up: camera {camera}; heights are exaggerated"
-    return picture(plots.layout(load_camera(camera)), caption, wide=True)
+    return compact(picture(plots.layout(load_camera(camera)), caption, wide=True))
 
 
 def cells(row: ResultRow) -> tuple[str, ...]:

@@ -36,12 +36,17 @@ def run(context: Context) -> ExperimentOutcome:
             for patch, size in _patches(found, dz).items()
         }
         rows += _rows(name, found, dz, seen)
+        rows.append(_best_row(lined, f"{name}, {dz * 1e3:+g} mm", 21 if context.quick else 39))
         figures.append(_bands(seen, f"{name} at {dz * 1e3:+g} mm"))
     return ExperimentOutcome(
         tuple(rows),
         tuple(figures),
         why="The sensor does not move with the depth: m' = b/a' (equation 5.9 has b'/a'), and the patch is "
-        "m' p z2'/L (5.10 has m' p).",
+        "m' p z2'/L (5.10 has m' p). Rays decide that; the sharpest patch of a Keplerian camera is 4 to 6 % "
+        "larger, in focus too: two lenslets see a point through different parts of the main lens' Fresnel "
+        "pattern, and their images of it stand farther apart than rays through their middles do. This is why "
+        "the printed, too large patch leaves less at +10 mm. Before a Galilean camera's image rays are "
+        "right to 1 %.",
     )
 
 
@@ -142,6 +147,19 @@ def _rows(name: str, found: FocusedPlenopticCamera, dz: float, seen: dict[str, _
         ),
     ]
     return rows
+
+
+def _best_row(lined: LinedCamera, head: str, lenslets: int) -> ResultRow:
+    """Patch that leaves least of the picture beside the grating, over that of rays; sizes 3 % apart."""
+    size = lined.camera.patch_at(lined.dz) * lined.camera.pixels.pixel_pitch
+    factors = np.array([0.97, 1.0, 1.03, 1.06, 1.09])
+    left = [_Picture(lined, factor * size, lenslets).error for factor in factors]
+    k = int(np.clip(np.argmin(left), 1, len(left) - 2))
+    bend, tilt, _ = np.polyfit(factors[k - 1 : k + 2], np.square(left[k - 1 : k + 2]), 2)
+    # Errors grow in proportion to what a patch is off: their squares are parabolas.
+    return ResultRow(f"sharpest patch over that of rays, {head}", -tilt / (2 * bend), "",
+        None, 1.04 if "Kep" in head else 1.0, 0.012, "by diffraction; no closed form is known",
+        "told")  # fmt: skip
 
 
 def _magnifications() -> tuple[object, str]:
