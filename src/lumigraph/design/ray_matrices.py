@@ -55,7 +55,7 @@ def surface(radius: float, before: float, behind: float) -> np.ndarray:
     A plano-convex lenslet of silica, thesis eq. 6.1: f = R/(n - 1).
 
     >>> power = surface(2.376e-3, 1.0, 1.457)[1, 0] + surface(float("inf"), 1.457, 1.0)[1, 0]
-    >>> round(-1e3 / power, 2)
+    >>> round(-1e3 / float(power), 2)
     5.2
     """
     n1, n2 = checks.positive("before", before), checks.positive("behind", behind)
