@@ -2,7 +2,6 @@
 
 import base64
 import hashlib
-import io
 import json
 import math
 import shutil
@@ -18,11 +17,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
 from lumigraph import store
 from lumigraph.core.progress import Progress, Stage, within
 from lumigraph.errors import FormatError
+from lumigraph.io import png
 from lumigraph.io.target import write_bytes
 from lumigraph.report.pictures import Picture, picture
 from lumigraph.studies.thesis.collected import experiments
@@ -148,13 +147,7 @@ def _run(one: Experiment, context: Context) -> StoredResult:
 def compact(shown: Picture) -> Picture:
     """Picture in 128 colours of its own: a third of the bytes, for grey values and lines alike."""
     start, content = shown.uri.split(",", 1)
-    with Image.open(io.BytesIO(base64.b64decode(content))) as image:
-        few = image.convert("RGB").quantize(
-            _COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
-        )
-    buffer = io.BytesIO()
-    few.save(buffer, "PNG", optimize=True)
-    smaller = base64.b64encode(buffer.getvalue()).decode()
+    smaller = base64.b64encode(png.in_few_colours(base64.b64decode(content), _COLOURS)).decode()
     return replace(shown, uri=f"{start},{smaller}") if len(smaller) < len(content) else shown
 
 
