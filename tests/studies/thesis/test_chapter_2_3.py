@@ -9,7 +9,7 @@ from lumigraph.studies.thesis.figures import _two_f as two_f
 from lumigraph.studies.thesis.figures import figure_2_11, figure_3_11, table_3_1
 from lumigraph.studies.thesis.figures._coherence import Errors, Imager, masked, snapshots, white
 
-FIGURES = ("2.4", "2.5", "2.11", "3.2", "3.3", "3.6", "3.11", "3.12", "3.15", "3.18", "3.19")
+FIGURES = ("2.4", "2.5", "2.11", "3.2", "3.3", "3.6", "3.8", "3.11", "3.12", "3.15", "3.18", "3.19")
 IDS = ("2.34", "table-2.1", "table-3.1", "table-3.2", *(f"figure-{number}" for number in FIGURES))
 
 

@@ -31,7 +31,7 @@ IDS = (
 
 
 # 5 s and more: run at full size alone
-SLOW = ("figure-5.3", "table-5.3", "table-5.4", "figure-5.17", "figure-6.5", "figure-6.6")
+SLOW = ("figure-5.3", "table-5.3", "table-5.4", "figure-5.17", "figure-6.5", "figure-6.6", "figure-6.8")
 
 
 @pytest.mark.parametrize("name", [name for name in IDS if name not in SLOW])
