@@ -16,7 +16,7 @@ from lumigraph.studies.thesis.figures import white_images
 from lumigraph.studies.thesis.figures.figure_6_8 import bench_image, laboratory_camera, target
 from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
 
-_TURN, _OFF = math.radians(0.3), -4.0
+_TURN, _OFF = math.radians(0.3), -2.0
 """Rotation of the lenslets; extra distance of each micro-image from the last one [px]."""
 
 _SAMPLES, _NEAR = 41, 3
