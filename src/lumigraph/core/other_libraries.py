@@ -9,7 +9,7 @@ from lumigraph.errors import LumigraphError
 
 
 class Map(Protocol):
-    """What `Linear` is."""
+    """A linear map and its transpose, as `Linear` has them."""
 
     @property
     def shape(self) -> Any:

@@ -60,9 +60,9 @@ class PupilMask:
             object.__setattr__(self, field, _table(name, getattr(self, field)))
         if self.opening is not None:
             low, high = min(map(min, self.opening)), max(map(max, self.opening))
-            if not (0 <= low and 0 < high <= 1):
+            if low < 0 or high > 1 or not high:
                 raise GeometryError(
-                    f"open goes from {low:g} to {high:g} but amplitudes are from 0 to 1, and somewhere above 0."
+                    f"open goes from {low:g} to {high:g} but amplitudes are from 0 to 1, and somewhere above."
                 )
 
     def phase(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -132,11 +132,11 @@ def _table(name: str, points: object) -> Points | None:
         found = np.array(points, np.float64)
     except (TypeError, ValueError):
         found = np.zeros(0)
-    if found.ndim != 2 or found.shape[0] != found.shape[1] or not LEAST <= len(found) <= MOST:
+    if found.ndim != 2 or len({*found.shape}) != 1 or not LEAST <= len(found) <= MOST:
         raise GeometryError(
             f"{name} has shape {found.shape} but must be a square table of {LEAST} x {LEAST} to "
             f"{MOST} x {MOST} control points."
         )
     if not np.isfinite(found).all():
         raise GeometryError(f"{name} has values that are not finite.")
-    return tuple(tuple(row) for row in found.tolist())
+    return tuple(tuple(float(one) for one in row) for row in found)

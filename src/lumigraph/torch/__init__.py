@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from lumigraph.torch.camera import Camera
+    from lumigraph.torch.for_deepinv import physics
     from lumigraph.torch.noise import Exposure
     from lumigraph.torch.operator import Operator
-    from lumigraph.torch.for_deepinv import physics
 
 __all__ = ["Camera", "Exposure", "Operator", "physics"]
 

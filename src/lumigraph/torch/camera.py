@@ -115,10 +115,8 @@ class Camera(torch.nn.Module):
         generator
             Of the noise.
         """
-        if isinstance(scene, Points):
-            whole = np.column_stack([scene.positions, scene.intensities])
-            scene = torch.as_tensor(whole, device=self.parts.device)[None]
-        given = scene.to(torch.float64)
+        asked = scene if isinstance(scene, torch.Tensor) else self._tensor(scene)
+        given = asked.to(torch.float64)
         if given.ndim == 3 and given.shape[-1] == 4:
             images = self._images()
             raw = torch.stack([self._of_points(images, one) for one in given])
@@ -126,12 +124,17 @@ class Camera(torch.nn.Module):
             raw = self._of_scenes(given)
         else:
             raise GeometryError(
-                f"scene has shape {tuple(scene.shape)} but must be points (batch, n, 4) or planes "
+                f"scene has shape {tuple(asked.shape)} but must be points (batch, n, 4) or planes "
                 "(batch, depth, y, x)."
             )
         if self.exposure is not None:
             raw = self.exposure(raw, generator) if self.training else self.exposure.mean(raw)
-        return raw.to(scene.dtype)
+        return raw.to(asked.dtype)
+
+    def _tensor(self, points: Points) -> torch.Tensor:
+        """Points as a batch of one."""
+        whole = np.column_stack([points.positions, points.intensities])
+        return torch.as_tensor(whole, device=self.parts.device)[None]
 
     def _of_points(self, images: PointImages, given: torch.Tensor) -> torch.Tensor:
         plain, raws = given.detach().cpu().numpy(), []

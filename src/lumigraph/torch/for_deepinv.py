@@ -43,7 +43,8 @@ def physics(operator: Linear, **more: Any) -> "LinearPhysics":
         from deepinv.physics import LinearPhysics
     except ImportError:
         raise LumigraphError(
-            "lumigraph.torch.physics needs deepinv, which is not installed. Run: pip install lumigraph[deepinv]"
+            "lumigraph.torch.physics needs deepinv, which is not installed. Run: "
+            "pip install lumigraph[deepinv]"
         ) from None
     model = Operator(operator)
 

@@ -72,8 +72,8 @@ class PointLight:
     def bright(self, source: SourcePoint) -> torch.Tensor:
         """Intensity of a point, as the pairs' lenses see it."""
         pairs = zip(self.expansion.ends, self.moved, strict=True)
-        ends = ([one.intensity for _, one in both(source, *pair)] for pair in pairs)
-        return self.expansion.tensor(source.intensity, ((k, *end) for k, end in enumerate(ends)))
+        ends = [[one.intensity for _, one in both(source, *pair)] for pair in pairs]
+        return self.expansion.tensor(source.intensity, ((k, a, b) for k, (a, b) in enumerate(ends)))
 
     def _beside(self, numbers: Numbers, source: SourcePoint, places: torch.Tensor) -> Numbers:
         own = self.own
@@ -144,7 +144,7 @@ def _repeated(plane: PartPlane, x: torch.Tensor, expand: Expand) -> torch.Tensor
             each = [again(lambda one=one: seen.bright(one) * seen.intensity(one)) for one in block.sources]
             return _added(block, _kernel(block, each), points, shape)
 
-        light = light + again(images, points)
+        light = light + images(points)
     (ry, rx) = cells.ring
     framed = torch.nn.functional.pad(light, (0, 0, rx, rx, ry, ry))
     return _read(whole, torch.stack([as_plane(one, cells, cells.samples) for one in framed]))
@@ -161,7 +161,8 @@ def _spread(plane: PartPlane | FilmPlane, whole: Expansion, x: torch.Tensor) -> 
         cells = optics.cells if isinstance(plane, PartPlane) else None
         return known.setdefault((cells, scale, optics.rotation), end)
 
-    return whole.linear(x, of, plane._points)
+    spread: Any = plane._points  # takes tensors, too
+    return whole.linear(x, of, spread)
 
 
 def _kernel(block: CellImages, images: Sequence[torch.Tensor]) -> torch.Tensor:

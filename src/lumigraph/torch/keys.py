@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -81,8 +81,8 @@ class Keys:
             part = (_number(self.camera, name) - low) / (high - low)
             if not -1e-9 <= part <= 1 + 1e-9:
                 raise FormatError(
-                    f"{name} is {value(self.camera, name)} but its range goes from {one.at(0)} to {one.at(1)}. "
-                    "Give a range that holds the camera's own value."
+                    f"{name} is {value(self.camera, name)} but its range goes from {one.at(0)} to "
+                    f"{one.at(1)}. Give a range that holds the camera's own value."
                 )
             parts.append(min(max(part, 0.0), 1.0))
         return np.array(parts)
@@ -111,10 +111,10 @@ class Keys:
         if key not in self._known:
             self._known.clear()
             more = {name: table.tolist() for name, table in tables.items()}
-            camera = changed(self.camera, more) if more else self.camera
-            camera = changed(camera, self.item(parts)) if self.ranges else camera
+            camera = cast(Camera, changed(self.camera, more)) if more else self.camera
+            camera = cast(Camera, changed(camera, self.item(parts))) if self.ranges else camera
             ends = [self._ends(camera, parts, k) for k in range(len(parts))] if pairs else []
-            self._known[key] = camera, ends  # type: ignore[assignment]  # a camera stays one
+            self._known[key] = camera, ends
         return self._known[key]
 
     def images(
@@ -141,10 +141,10 @@ class Keys:
         for side in (-APART, APART):
             there = parts.copy()
             there[number] = min(max(there[number] + side, 0.0), 1.0)
-            one = changed(camera, self.item(there))
+            one = cast(Camera, changed(camera, self.item(there)))
             if one.sensor.shape != camera.sensor.shape:  # it follows from the lengths where it is left out
                 one = one.replace(sensor={"shape": camera.sensor.shape})
-            ends.append(one.optics())  # type: ignore[attr-defined]  # a camera stays one
+            ends.append(one.optics())
         return ends[0], ends[1]
 
 

@@ -12,8 +12,12 @@ from lumigraph.operators.lenslets.array_libraries import Array
 class TorchLibrary:
     """Functions of arrays on a device; see `ArrayLibrary`."""
 
-    exp, real, sum, moveaxis = map(staticmethod, (torch.exp, torch.real, torch.sum, torch.movedim))
-    stack, concatenate = staticmethod(torch.stack), staticmethod(torch.cat)
+    exp = staticmethod(torch.exp)
+    real = staticmethod(torch.real)
+    stack = staticmethod(torch.stack)
+    concatenate = staticmethod(torch.cat)
+    sum = staticmethod(torch.sum)
+    moveaxis = staticmethod(torch.movedim)
 
     def __init__(self, device: torch.device) -> None:
         self.device = device

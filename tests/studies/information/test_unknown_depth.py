@@ -1,4 +1,4 @@
-"""Scenes whose depth is not known: a rule in closed form, beside drawn noise and rules that know the depth."""
+"""Scenes at an unknown depth: a rule in closed form, beside drawn noise and a depth that is known."""
 
 import numpy as np
 import pytest
