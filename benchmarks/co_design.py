@@ -1,9 +1,9 @@
 """Cameras and linear reconstruction trained together, at equal photons: ``python -m benchmarks.co_design``.
 
 Scenes stand at a depth that the reconstruction does not know. The best camera of the thesis' family is found
-on a grid; cameras without lenslets have a stop of several widths, terms of a phase mask that are searched with
-three seeds, a diffuser, or a coded aperture. Held-out pictures are drawn with noise and reconstructed, and the
-Cramér-Rao bound of a point's depth stands beside.
+on a grid; cameras without lenslets have a stop of several widths, terms of a phase mask that are searched
+with three seeds, a diffuser, or a coded aperture. Held-out pictures are drawn with noise and reconstructed,
+and the Cramér-Rao bound of a point's depth stands beside.
 """
 
 import itertools

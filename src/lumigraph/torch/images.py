@@ -182,9 +182,10 @@ def _added(
 ) -> torch.Tensor:
     """Light (k, rows, columns, samples) of points (k, rows, columns, points) through a block's images."""
     light = points.new_zeros(shape)
-    for offset in np.ndindex(*kernel.shape[:2]):
+    each = kernel.flatten(0, 1).unbind(0)  # slices one by one would each fill a whole slope with zeros
+    for offset, part in zip(np.ndindex(*kernel.shape[:2]), each, strict=True):
         y, x = block._from(offset, shape[1:])
-        light = light + points[:, y, x, block.numbers] @ kernel[offset]
+        light = light + points[:, y, x, block.numbers] @ part
     return light
 
 

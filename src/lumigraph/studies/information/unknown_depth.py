@@ -1,4 +1,4 @@
-r"""`unknown_depth`: the best linear reconstruction of scenes whose depth is not known, trained in closed form.
+r"""`unknown_depth`: best linear reconstruction of scenes whose depth is not known, trained in closed form.
 
 A scene x of covariance C stands at one of D depths, all as likely, before an instrument A_d of noise N_d and
 mean raw image m_d. One rule for all depths, x̂ = 1 + K (y - m) with m = ⟨m_d⟩, leaves least for
@@ -88,9 +88,11 @@ class _Depth:
 
     def waves(self, power: np.ndarray) -> np.ndarray:
         """A C^½ (pixels, n n)."""
-        n, parts = len(power), []
-        for one in np.eye(n * n).reshape(-1, 1, n, n):
-            parts.append(self.framed(self.seen.electrons(coloured(one, power))).ravel())
+        n = len(power)
+        parts = [
+            self.framed(self.seen.electrons(coloured(one, power))).ravel()
+            for one in np.eye(n * n).reshape(-1, 1, n, n)
+        ]
         return np.stack(parts, axis=1)
 
 

@@ -83,8 +83,8 @@ class Goal:
         "depth", "lateral" or "brightness", bounds of a point over the depths; "picture error" or "volume
         error", expected errors of reconstructed scenes, at each depth alone or at all at once;
         "reconstruction", the same by one linear rule that is trained together with the camera, for scenes
-        whose depth it does not know; or "light caught", a number that the camera's description prints, or one that
-        `lumigraph.metrology.datasheet.simulated` measures, such as "mtf@10/mm".
+        whose depth it does not know; or "light caught", a number that the camera's description prints, or one
+        that `lumigraph.metrology.datasheet.simulated` measures, such as "mtf@10/mm".
     largest
         Whether large is good.
     depths
