@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch.utils.checkpoint import checkpoint
 
 from lumigraph.elements import PupilMask
 from lumigraph.errors import GeometryError
@@ -126,7 +127,14 @@ class Expansion:
     def prepared(self, xp: Any, sources: Sequence[SourcePoint]) -> Numbers:
         """The lenslets' arrays, for the light of some points."""
         keys = list(dict.fromkeys(key for source in sources for key in self.own.keys(source)))
-        return self.own.lenslets.prepare(xp, self.of_lenslets(keys), keys) if keys else {}
+        if not keys:
+            return {}
+
+        def made() -> tuple[torch.Tensor, ...]:
+            found = self.own.lenslets.prepare(xp, self.of_lenslets(keys), keys)
+            return tuple(found[key] for key in keys)
+
+        return dict(zip(keys, again(made), strict=True))
 
     def linear(
         self,
@@ -143,6 +151,13 @@ class Expansion:
                 assert self.moves is not None
                 found = found + self.moves[k] * slope
         return found
+
+
+def again(function: Callable[..., Any], *given: torch.Tensor) -> Any:
+    """Value of a function that is computed once more on the way back, in place of keeping what it needs."""
+    if not torch.is_grad_enabled():
+        return function(*given)
+    return checkpoint(function, *given, use_reentrant=False, preserve_rng_state=False)
 
 
 def first_order(x: torch.Tensor) -> torch.Tensor:

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch.utils.checkpoint import checkpoint
 
 from lumigraph.core import arrays
 from lumigraph.errors import GeometryError
@@ -24,19 +23,12 @@ from lumigraph.operators.lenslets.whole_planes import WholePlane
 from lumigraph.operators.sampling.tiles import as_plane
 from lumigraph.propagation.window import smooth_size
 from lumigraph.scene import Points
-from lumigraph.torch.expansion import Expansion, Numbers
+from lumigraph.torch.expansion import Expansion, Numbers, again
 from lumigraph.torch.library import TorchLibrary
 from lumigraph.torch.operator import applied
 
 Expand = Callable[[SampledCamera, Sequence[Any]], Expansion]
 """Numbers of a camera and of pairs by the keys, to first order."""
-
-
-def again(function: Callable[..., torch.Tensor], *given: torch.Tensor) -> torch.Tensor:
-    """Value of a function that is computed once more on the way back, in place of keeping what it needs."""
-    if not torch.is_grad_enabled():
-        return function(*given)
-    return checkpoint(function, *given, use_reentrant=False, preserve_rng_state=False)  # type: ignore[return-value]
 
 
 class PointLight:
