@@ -11,6 +11,7 @@ import numpy as np
 from lumigraph import store
 from lumigraph.core.picture import png
 from lumigraph.errors import FormatError
+from lumigraph.io.png import load
 
 _RUN, _STEP = "run.json", "step-{:04d}"
 _WIDEST = 1000  # pixels of a logged picture
@@ -63,6 +64,10 @@ class AlignmentLog:
     def picture(self, number: int) -> bytes:
         """PNG of a step."""
         return (self.folder / (_STEP.format(number) + ".png")).read_bytes()
+
+    def image(self, number: int) -> np.ndarray:
+        """Picture (y, x) of a step, as logged."""
+        return np.asarray(load(self.folder / (_STEP.format(number) + ".png")).data)
 
     def step(self, number: int) -> dict[str, Any]:
         """Numbers of a step."""

@@ -16,7 +16,10 @@ TOLERANCES = {"m": 5e-6, "rad": 3.49e-4, "1": 1e-3}
 SURE = 1.96
 """Standard deviations that hold 95 %."""
 
-_DEADBAND = 0.2  # of the tolerance: smaller moves are not made
+_ONE_SIDED = 1.645
+"""Standard deviations below which 95 % are."""
+
+_DEADBAND = 0.2, 0.5  # of the tolerance, and of the standard deviation: smaller moves are not made
 _BEYOND = 1.2  # times the backlash that a motor goes back before it comes from the other side
 _LEARN = 6.0
 """Times the backlash, the tolerance and the standard deviation that moves go which tell a sign."""
@@ -67,7 +70,7 @@ def undetermined(belief: Belief, rays: BenchRays, tolerances: Mapping[str, float
     after, found = belief.expected(rays), []
     for motor in belief.motors:
         error, next_error = belief.error(motor.moves), after.error(motor.moves)
-        if SURE * error > tolerance(tolerances, motor.moves) and next_error > 0.9 * error:
+        if _ONE_SIDED * error > tolerance(tolerances, motor.moves) and next_error > 0.9 * error:
             found.append(motor.moves)
     return tuple(found)
 
@@ -78,7 +81,7 @@ def is_within(belief: Belief, tolerances: Mapping[str, float], but: Sequence[str
     Of those in `but` only the value counts, not how well it is known.
     """
     return all(
-        abs(belief[one.moves]) + (0 if one.moves in but else SURE) * belief.error(one.moves)
+        abs(belief[one.moves]) + (0 if one.moves in but else _ONE_SIDED) * belief.error(one.moves)
         <= tolerance(tolerances, one.moves)
         for one in belief.motors
     )  # fmt: skip
@@ -157,7 +160,7 @@ def next_moves(
     found = []
     for number, motor in enumerate(belief.motors):
         allowed = tolerance(tolerances, motor.moves)
-        if abs(belief[motor.moves]) > _DEADBAND * allowed:
+        if abs(belief[motor.moves]) > max(_DEADBAND[0] * allowed, _DEADBAND[1] * belief.error(motor.moves)):
             found.append(_best(belief, (number, positions[number]), allowed, rays))
     return tuple(found)
 

@@ -16,6 +16,7 @@ from lumigraph.metrology.twin import CAUSES, BenchModel, shown
 
 _STOP = 0.04  # part of the stop by which it is opened and closed, for the width's derivative
 _FARTHEST = 4  # whole lenslets by which an array may be shifted
+_NOISE = 0.005  # of the brightest pixel
 _SATURATED = 1e-3
 """Part of the pixels from which on a picture is too bright."""
 
@@ -70,15 +71,19 @@ class WhiteReader:
 
     @cached_property
     def _start(self) -> "tuple[WhiteReading, _Lit]":
-        return _measured(BenchModel(self.camera).white(np.zeros(len(CAUSES))))
+        return self._modelled(0.0)
+
+    def _modelled(self, aperture: float) -> "tuple[WhiteReading, _Lit]":
+        """Measures of the camera file's white image, with the noise of a picture: it decides what is used."""
+        light = BenchModel(self.camera).white([*6 * [0.0], aperture])
+        noise = np.random.default_rng(0).standard_normal(light.shape)
+        return _measured(light + _NOISE * light.max() * noise)
 
     @cached_property
     def rays(self) -> BenchRays:
         """The bench by its rays, from white images of the camera file with its stop, and with two others."""
         start, _ = self._start
-        model = BenchModel(self.camera)
-        sides = (_STOP, -_STOP)
-        opened = [_measured(model.white([*6 * [0.0], one]))[0].values[8] / start.values[8] - 1 for one in sides]
+        opened = [self._modelled(one)[0].values[8] / start.values[8] - 1 for one in (_STOP, -_STOP)]
         first, second = (opened[0] - opened[1]) / (2 * _STOP), (opened[0] + opened[1]) / (2 * _STOP**2)
         optics = self.camera.optics()
         lengths = (optics.separation, float(optics.lenslet_distance or 0), self.camera.sensor.pixel_pitch)

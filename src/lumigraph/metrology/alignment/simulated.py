@@ -16,6 +16,7 @@ from lumigraph.metrology.twin import CAUSES, BenchModel
 DRAWN = {"m": 0.3e-3, "rad": math.radians(1), "1": 0.05}
 """How far things are out of place at most that are drawn, by unit."""
 
+_AROUND = 0.6e-3  # m of sensor around the camera's, so that what comes into its picture is there
 _FULL = 60000.0  # brightest value of 16 bits
 
 
@@ -128,11 +129,12 @@ class SimulatedBench:
         shaken = dict(truth)
         for name in ("shift_y", "shift_x"):
             shaken[name] += self.vibration * self.rng.standard_normal()
-        model = BenchModel(self._stood(shaken))
-        return model.white([shaken[one] for one in CAUSES])
+        margin = math.ceil(_AROUND / self.camera.sensor.pixel_pitch)
+        light = BenchModel(self._stood(shaken, margin)).white([shaken[one] for one in CAUSES])
+        return light[margin:-margin, margin:-margin]
 
-    def _stood(self, truth: Mapping[str, float]) -> LensletCamera:
-        """The camera with distances and a pitch that are not those of `CAUSES`."""
+    def _stood(self, truth: Mapping[str, float], margin: int) -> LensletCamera:
+        """The camera with distances and a pitch that are not those of `CAUSES`, and more pixels around."""
         camera = self.camera
         built = {
             "separation": camera.separation + truth["separation"],
@@ -140,7 +142,7 @@ class SimulatedBench:
         }
         lenslets = {"pitch": camera.lenslets.pitch * (1 + truth["pitch"])}
         return camera.replace(
-            lenslets=lenslets if truth["pitch"] else {}, built=built, sensor={"shape": camera.sensor.shape},
+            lenslets=lenslets if truth["pitch"] else {}, built=built, sensor={"shape": tuple(n + 2 * margin for n in camera.sensor.shape)},
             main_lens={"diameter": camera.pupil_diameter},
         )  # fmt: skip
 
