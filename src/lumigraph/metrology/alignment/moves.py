@@ -148,40 +148,45 @@ def next_moves(
 ) -> tuple[Move, ...]:
     """Moves to where everything is in its place, by what is known.
 
-    A motor may come from two sides. Where another exposure follows anyway, the side is taken whose exposure
-    leaves the least uncertainty of the place and of the backlash, each over the tolerance; otherwise the
-    one that is surer to end in the right place.
+    A motor may come to its end from two sides. Where some motor will have to move once more in any case, the
+    side is taken whose exposure leaves the least uncertainty of place and backlash; otherwise the side from
+    which the end is surest.
 
     Raises
     ------
     BenchError
         A limit is in the way.
     """
-    found = []
+    choices = []
     for number, motor in enumerate(belief.motors):
-        allowed = tolerance(tolerances, motor.moves)
-        if abs(belief[motor.moves]) > max(_DEADBAND[0] * allowed, _DEADBAND[1] * belief.error(motor.moves)):
-            found.append(_best(belief, (number, positions[number]), allowed, rays))
-    return tuple(found)
+        error, allowed = belief.error(motor.moves), tolerance(tolerances, motor.moves)
+        if abs(belief[motor.moves]) > max(_DEADBAND[0] * allowed, _DEADBAND[1] * error):
+            found = _options(belief, number, positions[number])
+            choices.append([(one, _error_after(belief, one)) for one in found])
+    allowed = [tolerance(tolerances, belief.motors[some[0][0].number].moves) for some in choices]
+    again = any(_ONE_SIDED * min(e for _, e in some) > most for some, most in zip(choices, allowed, strict=True))
+    if again:
+        choices = [[(one, _told(belief, one, rays)) for one, _ in some] for some in choices]
+    return tuple(
+        min((round(score / most, 3), one.via is not None, k, one) for k, (one, score) in enumerate(some))[-1]
+        for some, most in zip(choices, allowed, strict=True)
+    )  # fmt: skip
 
 
-def _best(belief: Belief, place: tuple[int, float], allowed: float, rays: BenchRays) -> Move:
-    number, start = place
-    motor, scored = belief.motors[number], []
-    ends = []
+def _options(belief: Belief, number: int, start: float) -> list[Move]:
+    """Moves of a motor to where nothing is expected to be out of place, from both sides."""
+    motor, ends, found = belief.motors[number], [], []
     for side in (belief.sides[number] or 1, -(belief.sides[number] or 1)):
-        end = _end(belief, number, start, side)
-        ends.append(end)
-        move = route(motor, (number, start, belief.sides[number]), end, side)
-        if move is not None:
-            scored.append((_unsure(belief, move, allowed, rays), move.via is not None, len(scored), move))
-    if not scored:
+        ends.append(_end(belief, number, start, side))
+        move = route(motor, (number, start, belief.sides[number]), ends[-1], side)
+        found += [] if move is None else [move]
+    if not found:
         low, high = motor.limits
         raise BenchError(
             f"{motor.name} would have to go to {motor.shown(ends[0])} but its limits are {motor.shown(low)} and "
             f"{motor.shown(high)}. Move its carrier by hand by {shown(motor.moves, ends[0] - start)}, and start again."
         )
-    return min(scored)[-1]
+    return found
 
 
 def _end(belief: Belief, number: int, start: float, side: int) -> float:
@@ -191,12 +196,16 @@ def _end(belief: Belief, number: int, start: float, side: int) -> float:
     return start - motor.sign * slack
 
 
-def _unsure(belief: Belief, move: Move, allowed: float, rays: BenchRays) -> float:
-    """Variance that a move leaves, over the tolerance's square."""
-    motor = belief.motors[move.number]
-    after = belief.moved(move.number, move.end - move.start, move.side)
-    variance = after.error(motor.moves) ** 2
-    if SURE * min(belief.error(motor.moves), after.error(motor.moves)) > allowed / 2:  # an exposure follows
-        after = after.expected(rays)
-        variance = after.error(motor.moves) ** 2 + after.backlash(move.number)[1] ** 2
-    return round(float(np.sqrt(variance)) / allowed, 3)
+def _after(belief: Belief, move: Move) -> Belief:
+    return belief.moved(move.number, move.end - move.start, move.side)
+
+
+def _error_after(belief: Belief, move: Move) -> float:
+    """Standard deviation of what a motor moves, after a move."""
+    return _after(belief, move).error(belief.motors[move.number].moves)
+
+
+def _told(belief: Belief, move: Move, rays: BenchRays) -> float:
+    """Standard deviation of place and backlash together, after a move and the exposure that follows."""
+    after = _after(belief, move).expected(rays)
+    return float(np.hypot(after.error(belief.motors[move.number].moves), after.backlash(move.number)[1]))
