@@ -49,7 +49,9 @@ class ExactBench(SimulatedBench):
         """White image (y, x) of a camera file whose array leans."""
         pixels = math.ceil(0.6e-3 / self.camera.sensor.pixel_pitch)
         meant = self.camera.replace(sensor={"shape": tuple(n + 2 * pixels for n in self.camera.sensor.shape)})
-        true = [truth[name] for name in ("height", "tilt_y", "tilt_x", "shift_y", "shift_x", "turn", "aperture")]
+        true = [
+            truth[name] for name in ("height", "tilt_y", "tilt_x", "shift_y", "shift_x", "turn", "aperture")
+        ]
         return twin.stood(meant, true, truth["pitch"])[pixels:-pixels, pixels:-pixels]
 
 
@@ -100,12 +102,13 @@ def many(reader, runs, seed, exact):
         found.append(one)
         worst = max(one["left"], key=lambda name: abs(one["left"][name]))
         print(
-            f"bench {one['seed']}: {one['status']} in {one['exposures']} + {one['learning']} exposures; farthest "
-            f"{worst} {abs(one['left'][worst]):.2f} of its tolerance; inside 95 %: {one['inside']}", flush=True,
+            f"bench {one['seed']}: {one['status']} in {one['exposures']} + {one['learning']} exposures; "
+            f"farthest {worst} {abs(one['left'][worst]):.2f} of its tolerance; inside 95 %: {one['inside']}",
+            flush=True,
         )  # fmt: skip
     good = sum(max(map(abs, one["left"].values())) <= 1 and one["status"] == "aligned" for one in found)
-    print(f"{good} of {runs} within tolerance; exposures {dict(Counter(one['exposures'] for one in found))}, and "
-          f"{dict(Counter(one['learning'] for one in found))} to learn signs")  # fmt: skip
+    counts = (dict(Counter(one[name] for one in found)) for name in ("exposures", "learning"))
+    print("{} of {} within tolerance; exposures {}, and {} to learn signs".format(good, runs, *counts))
     print(f"{sum(one['inside'] for one in found)} of {runs} within the covariance stated at 95 %")
     for name in found[0]["left"]:
         print(f"{name:9s} worst {max(abs(one['left'][name]) for one in found):.2f} of the tolerance")
@@ -116,8 +119,8 @@ def many(reader, runs, seed, exact):
 
 def kept(reader, hours, seed):
     """Print how well a drifting bench is kept."""
-    lengths = {name: "5 um" for name in ("height", "shift_y", "shift_x")}
-    angles = {name: "0.01 deg" for name in ("tilt_y", "tilt_x", "turn")}
+    lengths = dict.fromkeys(("height", "shift_y", "shift_x"), "5 um")
+    angles = dict.fromkeys(("tilt_y", "tilt_x", "turn"), "0.01 deg")
     bench, made = drawn(reader.camera, seed, drift={**lengths, **angles})
     goal = lg.metrology.AlignmentGoal(pitch_error=PITCH_ERROR)
     worst, steps, moved = {}, [], 0
@@ -148,7 +151,9 @@ def main():
     began = time.process_time()
     reader = lg.metrology.WhiteReader(camera)
     _ = reader.rays
-    print(f"{time.process_time() - began:.1f} CPU s once for the camera, {camera.sensor.shape} px", flush=True)
+    print(
+        f"{time.process_time() - began:.1f} CPU s once for the camera, {camera.sensor.shape} px", flush=True
+    )
     if given.hours:
         kept(reader, given.hours, given.seed)
     else:

@@ -46,7 +46,7 @@ def align(
     camera
         Camera file, or a name of the catalogue: the intended bench.
     log
-        Folder of the steps, bench.log beside BENCH if left out. The same command resumes what was interrupted.
+        Folder of the steps, bench.log beside BENCH if left out. Safe to interrupt: run the same command again.
     dark
         Picture without light; left out, the sensor's black level.
     pitch_error
@@ -106,7 +106,9 @@ def _tolerances(texts: tuple[str, ...]) -> dict[str, float]:
     for text in texts:
         name, _, value = text.partition("=")
         if name not in MOVABLE or not value:
-            raise FormatError(f"--tolerance {text!r} must be NAME=VALUE, the name one of {', '.join(MOVABLE)}.")
+            raise FormatError(
+                f"--tolerance {text!r} must be NAME=VALUE, the name one of {', '.join(MOVABLE)}."
+            )
         found[name] = number(f"--tolerance {name}", value, name)
     return found
 
@@ -163,8 +165,10 @@ def _figures(steps: list[dict[str, Any]], log: "AlignmentLog | None", drift: Any
 
     names = steps[0]["moved_by_motors"]
     rows = [["exposure", "status", *names]]
-    for one in steps:
-        rows.append([str(one["number"]), one["status"], *(shown(name, one["out"][name]) for name in names)])
+    rows += [
+        [str(one["number"]), one["status"], *(shown(name, one["out"][name]) for name in names)]
+        for one in steps
+    ]
     yield Figure(rows, section="Steps")
     if log is not None:
         yield Figure(plots.alignment(steps), "What is out of place after each exposure, over 1 µm, 0.001° or "
@@ -174,5 +178,3 @@ def _figures(steps: list[dict[str, Any]], log: "AlignmentLog | None", drift: Any
             yield Figure(plots.alignment_picture(log.image(number), steps[number]), title, "White images")
     if drift is not None:
         yield Figure(drift, section="Drift")
-
-

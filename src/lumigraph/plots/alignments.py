@@ -23,13 +23,15 @@ def alignment(steps: Sequence[Mapping[str, Any]]) -> Figure:
     """
     units = {name: _UNITS.get(name[:4], _LENGTH) for name in steps[0]["moved_by_motors"]}
     kinds = list(dict.fromkeys(units.values()))
-    figure, axes = canvas(1, len(kinds), width=3.6 * len(kinds), height=3.4)
+    figure, axes = canvas(1, len(kinds), width=3.6, height=3.4)
     numbers = [one["number"] for one in steps]
-    for axis, (scale, unit) in zip(np.atleast_1d(axes), kinds, strict=True):
+    for axis, (scale, unit) in zip(axes, kinds, strict=True):
         for name in (one for one, kind in units.items() if kind == (scale, unit)):
             values = [scale * one["out"][name] for one in steps]
             errors = [1.96 * scale * one["errors"][name] for one in steps]
-            axis.errorbar(numbers, values, errors, label=name.replace("_", " "), capsize=2, marker="o", markersize=3)
+            axis.errorbar(
+                numbers, values, errors, label=name.replace("_", " "), capsize=2, marker="o", markersize=3
+            )
         axis.axhline(0, color="0.7", linewidth=0.8, zorder=0)
         axis.set_xlabel("exposure")
         axis.set_ylabel(f"out of place [{unit}]")
@@ -49,7 +51,7 @@ def alignment_picture(picture: Array, step: Mapping[str, Any]) -> Figure:
         `AlignmentStep.values`, or those of a log.
     """
     image = np.asarray(picture, float)
-    figure, axis = canvas(1, 1, width=5.0, height=5.0)
+    figure, (axis,) = canvas(1, 1, width=5.0, height=5.0)
     draw(axis, image / (image.max() or 1.0))
     places = np.array(step["centers"]) * image.shape[0] / step["shape"][0]
     axis.plot(*places.T[::-1], "+", color="tab:red", markersize=3, markeredgewidth=0.6)

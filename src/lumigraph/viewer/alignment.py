@@ -48,7 +48,8 @@ def shown_step(log: AlignmentLog, number: int) -> dict[str, Any]:
         rows.append([
             name.replace("_", " "), shown(name, found["out"][name]),
             f"± {shown(name, 1.96 * found['errors'][name], signed=False)}",
-            "" if expected is None else shown(name, expected), "" if reached is None else shown(name, reached),
+            "" if expected is None else shown(name, expected),
+            "" if reached is None else shown(name, reached),
             f"{shown(name, play, signed=False)} ± {shown(name, 1.96 * error, signed=False)}" if play else "",
         ])  # fmt: skip
     image = "data:image/png;base64," + b64encode(log.picture(number)).decode()

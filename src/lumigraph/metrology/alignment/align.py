@@ -1,4 +1,4 @@
-"""Alignment of a bench in a closed loop: expose, compare with the camera file, move, until all is in place."""
+"""Alignment of a bench in a closed loop: expose, compare with the camera file, move."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from lumigraph.core import checks
-from lumigraph.core.raw import RawImage
 from lumigraph.core.short_repr import brief
 from lumigraph.errors import LumigraphError
 from lumigraph.instruments import LensletCamera
@@ -60,7 +59,9 @@ class AlignmentGoal:
         checks.whole("exposures", self.exposures)
         for name, value in self.tolerances.items():
             if name not in (*STATES, *TOLERANCES):
-                raise BenchError(f"there is no tolerance of {name!r}; there are those of {', '.join(STATES)}.")
+                raise BenchError(
+                    f"there is no tolerance of {name!r}; there are those of {', '.join(STATES)}."
+                )
             checks.positive(f"tolerance of {name}", value, "1")
         object.__setattr__(self, "tolerances", {**TOLERANCES, **self.tolerances})
 
@@ -134,7 +135,8 @@ class AlignmentStep:
             "number": self.number, "seconds": self.seconds, "status": self.status,
             "out": dict(zip(STATES, belief.mean[: len(STATES)].tolist(), strict=True)),
             "errors": dict(zip(STATES, belief.errors.tolist(), strict=True)),
-            "moved_by_motors": [one.moves for one in belief.motors], "signs": [one.sign for one in belief.motors],
+            "moved_by_motors": [one.moves for one in belief.motors],
+            "signs": [one.sign for one in belief.motors],
             "backlash": [belief.backlash(k) for k in range(len(belief.motors))],
             "positions": list(self.positions), "moves": [asdict(one) for one in self.moves],
             "reached": {name: list(pair) for name, pair in self.reached.items()},
@@ -232,7 +234,11 @@ class _Loop:
 
     @classmethod
     def of(
-        cls, bench: Bench, camera: LensletCamera | WhiteReader, goal: AlignmentGoal, log: str | PathLike[str] | None
+        cls,
+        bench: Bench,
+        camera: LensletCamera | WhiteReader,
+        goal: AlignmentGoal,
+        log: str | PathLike[str] | None,
     ) -> "_Loop":
         reader = camera if isinstance(camera, WhiteReader) else WhiteReader(camera)
         kept = None if log is None else AlignmentLog.at(log)
@@ -252,7 +258,9 @@ class _Loop:
                 self._move(move)
 
     def _resume(self, last: dict[str, Any], count: int) -> None:
-        motors = tuple(replace(m, sign=s) for m, s in zip(self.bench.setup.motors, last["signs"], strict=True))
+        motors = tuple(
+            replace(m, sign=s) for m, s in zip(self.bench.setup.motors, last["signs"], strict=True)
+        )
         self.belief, self.number, self.light = Belief.of(motors, last["belief"]), count, last["brightness"]
         moves = {one["number"]: Move(**one) for one in last["moves"]}
         for number, (motor, logged) in enumerate(zip(motors, last["positions"], strict=True)):
@@ -289,7 +297,16 @@ class _Loop:
             self._check_progress(positions)
             status, moves, notes = self._planned(list(positions), last, watching)
         step = AlignmentStep(
-            self.number, self.bench.now(), status, self.belief, reading, picture, positions, moves, reached, notes
+            self.number,
+            self.bench.now(),
+            status,
+            self.belief,
+            reading,
+            picture,
+            positions,
+            moves,
+            reached,
+            notes,
         )
         self._log(step)
         self.number += 1
@@ -323,7 +340,7 @@ class _Loop:
             return "moving", next_moves(belief, positions, some, rays), ()
         unknown = undetermined(belief, rays, allowed)
         notes = tuple(
-            f"{one} is known to ± {shown(one, SURE * belief.error(one), signed=False)} and no white image tells more"
+            f"{one} is known to ± {shown(one, SURE * belief.error(one), signed=False)}: no white image tells more"
             for one in unknown
         )
         if is_within(belief, allowed, unknown):
@@ -337,11 +354,12 @@ class _Loop:
         self.light = self.light or reading.brightness
         if reading.brightness < _DARK * self.light:
             raise BenchError(
-                f"the light is lost: {reading.brightness:.3g} a pixel, {self.light:.3g} at first. Check lamp and shutter."
+                f"the light is lost: {reading.brightness:.3g} a pixel, {self.light:.3g} at first. "
+                "Check lamp and shutter."
             )
 
     def _judged(self, reading: WhiteReading) -> dict[str, tuple[float, float]]:
-        """Changes expected and reached by the last moves; learns signs, and refuses motors that do not obey."""
+        """Changes expected and reached by the last moves; refuses motors that do not obey."""
         free, motors = self.belief, self.belief.motors
         if not self.pending:
             return {}
@@ -368,14 +386,17 @@ class _Loop:
     def _check_progress(self, positions: tuple[float, ...]) -> None:
         """Keep the best place, and refuse to go on where moves have made things worse twice."""
         score = max(
-            abs(self.belief[one.moves]) / tolerance(self.goal.tolerances, one.moves) for one in self.belief.motors
+            abs(self.belief[one.moves]) / tolerance(self.goal.tolerances, one.moves)
+            for one in self.belief.motors
         )
         self.worse = self.worse + 1 if score > max(1.5 * self.last, 1.0) else 0
         self.last = score
         if self.best is None or score <= self.best[0]:
             self.best = (score, positions)
         if self.worse >= _WORSE:
-            raise BenchError("moves made things worse twice. Check that motors move what the bench file says.")
+            raise BenchError(
+                "moves made things worse twice. Check that motors move what the bench file says."
+            )
 
     def back(self, positions: tuple[float, ...]) -> str:
         """Where the bench was left: at its best place so far, where its motors still obey."""
@@ -414,8 +435,8 @@ def _check_obeys(name: str, asked: str, ways: tuple[float, float], sign: int) ->
     way, change = ways
     if abs(change) < _UNMOVED * abs(way):
         raise BenchError(
-            f"{name} was moved by {asked} but the picture shows {change / way:+.0%} of that: the stage does not "
-            "move, or moves something else. Check its clamp and its device in the bench file."
+            f"{name} was moved by {asked} but the picture shows {change / way:+.0%} of that: the stage "
+            "does not move, or moves something else. Check its clamp and its device in the bench file."
         )
     if sign and change * sign * way < 0:
         raise BenchError(

@@ -146,7 +146,9 @@ class Belief:
     @classmethod
     def of(cls, motors: Sequence[Motor], values: dict[str, Any]) -> "Belief":
         """Belief from `values`."""
-        return cls(tuple(motors), np.array(values["mean"]), np.array(values["covariance"]), tuple(values["sides"]))
+        return cls(
+            tuple(motors), np.array(values["mean"]), np.array(values["covariance"]), tuple(values["sides"])
+        )
 
 
 def _rest(rays: BenchRays, reading: WhiteReading, mean: np.ndarray) -> np.ndarray:

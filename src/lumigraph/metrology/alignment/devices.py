@@ -44,7 +44,8 @@ class Bench:
             if label not in known:
                 others = ", ".join(one for one in known if one != "Core") or "none"
                 raise BenchError(
-                    f"there is no device {label!r}: Micro-Manager has {others}. Correct the bench file, or load it."
+                    f"there is no device {label!r}: Micro-Manager has {others}. "
+                    "Correct the bench file, or load it."
                 )
 
     @property
@@ -71,8 +72,8 @@ class Bench:
         low, high = motor.limits
         if not low <= position <= high:
             raise BenchError(
-                f"{motor.name} was to go to {motor.shown(position)}, beyond its limits {motor.shown(low)} and "
-                f"{motor.shown(high)}: it was not moved. Check the bench file."
+                f"{motor.name} was to go to {motor.shown(position)}, beyond its limits {motor.shown(low)} "
+                f"and {motor.shown(high)}: it was not moved. Check the bench file."
             )
         self._asked(motor, "moved", lambda: self._send(motor, position / motor.unit))
         reached = self.position(motor)
@@ -101,7 +102,8 @@ class Bench:
             raise BenchError(f"{label} gives pictures of shape {image.shape} but must give grey ones (y, x).")
         if self._last is not None and np.array_equal(image, self._last):
             raise BenchError(
-                f"{label} gives the same picture twice, to the last bit: its frame is frozen. Restart the camera."
+                f"{label} gives the same picture twice, to the last bit: its frame is frozen. "
+                "Restart the camera."
             )
         self._last = image
         return image
@@ -134,7 +136,8 @@ class Bench:
             raise
         except Exception as error:
             raise BenchError(
-                f"{motor.name} cannot be {what}: {_words(error)}. Check the device and its name in the bench file."
+                f"{motor.name} cannot be {what}: {_words(error)}. "
+                "Check the device and its name in the bench file."
             ) from error
 
 

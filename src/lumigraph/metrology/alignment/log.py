@@ -51,7 +51,9 @@ class AlignmentLog:
         begun = store.read_note(path)
         for name, value in what.items():
             if begun.get(name) != value:
-                raise FormatError(f"{self.folder} is the log of another {name}. Give another --log, or remove it.")
+                raise FormatError(
+                    f"{self.folder} is the log of another {name}. Give another --log, or remove it."
+                )
 
     def record(self, number: int, values: Mapping[str, Any], picture: np.ndarray) -> None:
         """Write one step: its picture first, then its numbers, which make it count."""
@@ -86,4 +88,6 @@ class AlignmentLog:
 
     def stopped(self, why: str, left: str, positions: Mapping[str, float]) -> None:
         """Note why an alignment ended, and where the bench was left."""
-        store.write_note(self.folder / "stopped.json", {"why": why, "left": left, "positions": dict(positions)})
+        store.write_note(
+            self.folder / "stopped.json", {"why": why, "left": left, "positions": dict(positions)}
+        )

@@ -133,12 +133,14 @@ def learning(belief: Belief, positions: Sequence[float], tolerances: Mapping[str
             continue
         way = _LEARN * max(motor.backlash, tolerance(tolerances, motor.moves), belief.error(motor.moves))
         side = belief.sides[number] or 1
-        found = [route(motor, (number, start, belief.sides[number]), start + one, side) for one in (way, -way)]
+        found = [
+            route(motor, (number, start, belief.sides[number]), start + one, side) for one in (way, -way)
+        ]
         usable = [one for one in found if one is not None]
         if not usable:
             raise BenchError(
-                f"{motor.name} cannot move by {motor.shown(way, signed=False)} either way to learn its sign: it "
-                f"stands at {motor.shown(start)}. Give its sign in the bench file, or move it off its limits."
+                f"{motor.name} cannot move by {motor.shown(way, signed=False)} either way to learn its sign: "
+                f"it stands at {motor.shown(start)}. Give its sign in the bench file, or move it off its limits."
             )
         yield usable[0]
 
@@ -164,7 +166,9 @@ def next_moves(
             found = _options(belief, number, positions[number])
             choices.append([(one, _error_after(belief, one)) for one in found])
     allowed = [tolerance(tolerances, belief.motors[some[0][0].number].moves) for some in choices]
-    again = any(_ONE_SIDED * min(e for _, e in some) > most for some, most in zip(choices, allowed, strict=True))
+    again = any(
+        _ONE_SIDED * min(e for _, e in some) > most for some, most in zip(choices, allowed, strict=True)
+    )
     if again:
         choices = [[(one, _told(belief, one, rays)) for one, _ in some] for some in choices]
     return tuple(
@@ -183,8 +187,9 @@ def _options(belief: Belief, number: int, start: float) -> list[Move]:
     if not found:
         low, high = motor.limits
         raise BenchError(
-            f"{motor.name} would have to go to {motor.shown(ends[0])} but its limits are {motor.shown(low)} and "
-            f"{motor.shown(high)}. Move its carrier by hand by {shown(motor.moves, ends[0] - start)}, and start again."
+            f"{motor.name} would have to go to {motor.shown(ends[0])} but its limits are {motor.shown(low)} "
+            f"and {motor.shown(high)}. Move its carrier by hand by {shown(motor.moves, ends[0] - start)}, "
+            "and start again."
         )
     return found
 

@@ -24,7 +24,8 @@ def open_bench(setup: BenchSetup | str | PathLike[str], camera: LensletCamera) -
         from lumigraph.metrology.alignment import unicore
     except ImportError as error:
         raise FormatError(
-            f"benches need pymmcore-plus, which is missing ({error}). Install it: pip install 'lumigraph[bench]'."
+            f"benches need pymmcore-plus, which is missing ({error}). Install it: "
+            "pip install 'lumigraph[bench]'."
         ) from None
     if setup.simulated is None:
         return unicore.loaded(setup)

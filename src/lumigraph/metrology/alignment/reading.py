@@ -1,8 +1,9 @@
-"""What one white image says about a bench: the measures of `twin`, and by which whole lenslets it is shifted."""
+"""White images of a bench measured as by `twin`, up to whole lenslets of the shift."""
 
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from scipy.ndimage import uniform_filter
@@ -12,7 +13,7 @@ from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.instruments import LensletCamera
 from lumigraph.metrology.alignment.rays import MEASURES, BenchRays
-from lumigraph.metrology.twin import CAUSES, BenchModel, shown
+from lumigraph.metrology.twin import BenchModel, shown
 
 _STOP = 0.04  # part of the stop by which it is opened and closed, for the width's derivative
 _FARTHEST = 4  # whole lenslets by which an array may be shifted
@@ -129,7 +130,11 @@ class WhiteReader:
             raise CalibrationError(
                 f"{part:.1%} of the picture's pixels are saturated (at {top:g}). Shorten the exposure time."
             )
-        dark = self.camera.sensor.black_level if self.dark is None else np.asarray(to_numpy(self.dark.data), float)
+        dark = (
+            self.camera.sensor.black_level
+            if self.dark is None
+            else np.asarray(to_numpy(self.dark.data), float)
+        )
         return data - dark
 
     def _whole(self, lit: "_Lit") -> tuple[int, int] | None:
@@ -140,8 +145,9 @@ class WhiteReader:
         span = range(-_FARTHEST, _FARTHEST + 1)
         seen = list(zip(lit.index.tolist(), lit.lit.tolist(), strict=True))
         score = {
-            (i, j): sum(((y - i, x - j) in array) == bright for (y, x), bright in seen) for i in span for j in span
-        }  # fmt: skip
+            (i, j): sum(((y - i, x - j) in array) == bright for (y, x), bright in seen)
+            for i, j in product(span, span)
+        }
         (best, most), (_, next_most) = sorted(score.items(), key=lambda one: -one[1])[:2]
         return best if most - next_most >= _CLEARLY else None
 

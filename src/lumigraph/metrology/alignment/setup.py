@@ -149,12 +149,19 @@ def setup_of(table: Mapping[str, Any], folder: Path = Path()) -> BenchSetup:
     _only(table, ("camera", "config", "drift", "motor", "known", "simulated"), "the bench file")
     camera, config = table.get("camera", "Camera"), table.get("config")
     simulated, known = table.get("simulated"), table.get("known", {})
-    for name, value, kind in (("camera", camera, str), ("config", config or "", str), ("known", known, dict),
-                              ("motor", table.get("motor", []), list), ("simulated", simulated or {}, dict)):  # fmt: skip
+    kinds = (
+        ("camera", camera, str), ("config", config or "", str), ("known", known, dict),
+        ("motor", table.get("motor", []), list), ("simulated", simulated or {}, dict),
+    )  # fmt: skip
+    for name, value, kind in kinds:
         if not isinstance(value, kind):
-            raise FormatError(f"{name} of the bench file is {checks.shown(value)} but must be a {_KINDS[kind]}.")
+            raise FormatError(
+                f"{name} of the bench file is {checks.shown(value)} but must be a {_KINDS[kind]}."
+            )
     if (simulated is None) == (config is None):
-        raise FormatError("the bench file needs either config, a file of Micro-Manager, or a table [simulated].")
+        raise FormatError(
+            "the bench file needs either config, a file of Micro-Manager, or a table [simulated]."
+        )
     _only(known, STATES, "[known]")
     return BenchSetup(
         camera,
@@ -177,7 +184,9 @@ def number(name: str, value: Any, state: str) -> float:
         try:
             found = float(text.removesuffix("%")) * (0.01 if text.endswith("%") else 1.0)
         except ValueError:
-            raise FormatError(f"{name} is {checks.shown(value)} but must be a part, as 0.001 or '0.1 %'.") from None
+            raise FormatError(
+                f"{name} is {checks.shown(value)} but must be a part, as 0.001 or '0.1 %'."
+            ) from None
         return checks.finite(name, found, "1", FormatError)
     try:
         return parse(value, _DIMENSION[unit])

@@ -141,8 +141,9 @@ class SimulatedBench:
             "lenslet_distance": camera.lenslet_distance + truth["sensor"],
         }
         lenslets = {"pitch": camera.lenslets.pitch * (1 + truth["pitch"])}
+        shape = tuple(n + 2 * margin for n in camera.sensor.shape)
         return camera.replace(
-            lenslets=lenslets if truth["pitch"] else {}, built=built, sensor={"shape": tuple(n + 2 * margin for n in camera.sensor.shape)},
+            lenslets=lenslets if truth["pitch"] else {}, built=built, sensor={"shape": shape},
             main_lens={"diameter": camera.pupil_diameter},
         )  # fmt: skip
 
@@ -175,7 +176,10 @@ def simulated(setup: BenchSetup, camera: LensletCamera) -> SimulatedBench:
         motors.append(SimulatedMotor(motor, sign, backlash, 0.0, carriage, motor.moves == stuck))
     for name, value in table.get("out", {}).items():
         state[name] = number(f"[simulated] out.{name}", value, name)
-    drift = {name: number(f"[simulated] drift.{name}", value, name) for name, value in table.get("drift", {}).items()}
+    drift = {
+        name: number(f"[simulated] drift.{name}", value, name)
+        for name, value in table.get("drift", {}).items()
+    }
     options: dict[str, Any] = {name: table[name] for name in ("noise", "fading", "frozen") if name in table}
     shaken = number("[simulated] vibration", table.get("vibration", 0), "shift_x")
     return SimulatedBench(camera, state, tuple(motors), rng, drift=drift, vibration=shaken, **options)

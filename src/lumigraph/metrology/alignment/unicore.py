@@ -1,4 +1,4 @@
-"""Devices of Micro-Manager by pymmcore-plus: those of a simulated bench, and those of a configuration file."""
+"""Devices of Micro-Manager by pymmcore-plus: simulated ones, and those of a configuration file."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -33,7 +33,9 @@ def loaded(setup: BenchSetup) -> Bench:
     try:
         core.loadSystemConfiguration(Path(setup.config or ""))
     except Exception as error:
-        raise BenchError(f"Micro-Manager cannot load {setup.config}: {' '.join(str(error).split())[:200]}") from error
+        raise BenchError(
+            f"Micro-Manager cannot load {setup.config}: {' '.join(str(error).split())[:200]}"
+        ) from error
     return Bench(core, setup)
 
 
@@ -138,7 +140,9 @@ class _Properties(GenericDevice):
         super().__init__()
         for one in motors:
             get, go = _accessors(one)
-            self.register_property(one.motor.setting, default_value=0.0, getter=get, setter=go, property_type=float)
+            self.register_property(
+                one.motor.setting, default_value=0.0, getter=get, setter=go, property_type=float
+            )
 
 
 def _accessors(one: SimulatedMotor) -> tuple[Callable[[Any], float], Callable[[Any, float], None]]:
