@@ -340,7 +340,8 @@ class _Loop:
             return "moving", next_moves(belief, positions, some, rays), ()
         unknown = undetermined(belief, rays, allowed)
         notes = tuple(
-            f"{one} is known to ± {shown(one, SURE * belief.error(one), signed=False)}: no white image tells more"
+            f"{one} is known to ± {shown(one, SURE * belief.error(one), signed=False)}; "
+            "white images tell no more"
             for one in unknown
         )
         if is_within(belief, allowed, unknown):

@@ -140,7 +140,7 @@ def learning(belief: Belief, positions: Sequence[float], tolerances: Mapping[str
         if not usable:
             raise BenchError(
                 f"{motor.name} cannot move by {motor.shown(way, signed=False)} either way to learn its sign: "
-                f"it stands at {motor.shown(start)}. Give its sign in the bench file, or move it off its limits."
+                f"it stands at {motor.shown(start)}. Give its sign in the bench file, or move it away."
             )
         yield usable[0]
 
