@@ -78,13 +78,14 @@ def undetermined(belief: Belief, rays: BenchRays, tolerances: Mapping[str, float
 def is_within(belief: Belief, tolerances: Mapping[str, float], but: Sequence[str] = ()) -> bool:
     """True if everything that motors move is within its tolerance, in 95 of 100 cases.
 
-    Of those in `but` only the value counts, not how well it is known.
+    Of those in `but` the value counts only as far as it is known.
     """
-    return all(
-        abs(belief[one.moves]) + (0 if one.moves in but else _ONE_SIDED) * belief.error(one.moves)
-        <= tolerance(tolerances, one.moves)
-        for one in belief.motors
-    )  # fmt: skip
+    for one in belief.motors:
+        error, allowed = belief.error(one.moves), tolerance(tolerances, one.moves)
+        known = max(allowed, _DEADBAND[1] * error) if one.moves in but else allowed - _ONE_SIDED * error
+        if abs(belief[one.moves]) > known:
+            return False
+    return True
 
 
 def route(motor: Motor, place: tuple[int, float, int], end: float, side: int) -> Move | None:

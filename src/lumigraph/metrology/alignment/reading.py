@@ -13,11 +13,14 @@ from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.instruments import LensletCamera
 from lumigraph.metrology.alignment.rays import MEASURES, BenchRays
-from lumigraph.metrology.twin import BenchModel, shown
+from lumigraph.metrology.twin import CAUSES, BenchModel, shown
 
 _STOP = 0.04  # part of the stop by which it is opened and closed, for the width's derivative
 _FARTHEST = 4  # whole lenslets by which an array may be shifted
-_NOISE = 0.005  # of the brightest pixel
+_NOISE = 0.0025
+"""Noise of the camera file's white image, of its brightest pixel: some decides which micro-images are used."""
+
+_TILT, _COPIES = 2e-5, 5  # rad by which such an image may err, and how many are averaged at most
 _SATURATED = 1e-3
 """Part of the pixels from which on a picture is too bright."""
 
@@ -72,19 +75,22 @@ class WhiteReader:
 
     @cached_property
     def _start(self) -> "tuple[WhiteReading, _Lit]":
-        return self._modelled(0.0)
-
-    def _modelled(self, aperture: float) -> "tuple[WhiteReading, _Lit]":
-        """Measures of the camera file's white image, with the noise of a picture: it decides what is used."""
-        light = BenchModel(self.camera).white([*6 * [0.0], aperture])
-        noise = np.random.default_rng(0).standard_normal(light.shape)
-        return _measured(light + _NOISE * light.max() * noise)
+        light = BenchModel(self.camera).white(np.zeros(len(CAUSES)))
+        first, lit = _measured(_noisy(light, 0))
+        b, pixel = self.camera.lenslet_distance, self.camera.sensor.pixel_pitch
+        lever = first.reach**2 * pixel / (self.camera.separation + b)
+        count = math.ceil((float(first.errors[6:8].max()) / (_TILT * lever)) ** 2)
+        others = [_measured(_noisy(light, k))[0].values for k in range(1, min(count, _COPIES))]
+        values, errors = np.mean([first.values, *others], 0), first.errors / math.sqrt(1 + len(others))
+        return replace(first, values=values, errors=errors), lit
 
     @cached_property
     def rays(self) -> BenchRays:
         """The bench by its rays, from white images of the camera file with its stop, and with two others."""
         start, _ = self._start
-        opened = [self._modelled(one)[0].values[8] / start.values[8] - 1 for one in (_STOP, -_STOP)]
+        model = BenchModel(self.camera)
+        lights = [_noisy(model.white([*6 * [0.0], one]), 0) for one in (_STOP, -_STOP)]
+        opened = [_measured(light)[0].values[8] / start.values[8] - 1 for light in lights]
         first, second = (opened[0] - opened[1]) / (2 * _STOP), (opened[0] + opened[1]) / (2 * _STOP**2)
         optics = self.camera.optics()
         lengths = (optics.separation, float(optics.lenslet_distance or 0), self.camera.sensor.pixel_pitch)
@@ -175,3 +181,7 @@ def _measured(white: np.ndarray) -> tuple[WhiteReading, _Lit]:
     values, errors = seen.values[:MEASURES], seen.errors[:MEASURES]
     reading = WhiteReading(values, errors, seen.reach, None, found.centers, float(white.mean()))
     return reading, _Lit(index - nearest, lit)
+
+
+def _noisy(light: np.ndarray, seed: int) -> np.ndarray:
+    return light + _NOISE * light.max() * np.random.default_rng(seed).standard_normal(light.shape)
