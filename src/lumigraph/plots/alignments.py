@@ -35,7 +35,7 @@ def alignment(steps: Sequence[Mapping[str, Any]]) -> Figure:
         axis.axhline(0, color="0.7", linewidth=0.8, zorder=0)
         axis.set_xlabel("exposure")
         axis.set_ylabel(f"out of place [{unit}]")
-        axis.xaxis.get_major_locator().set_params(integer=True)
+        axis.locator_params(axis="x", integer=True)
         axis.legend(frameon=False, fontsize="small")
     return figure
 

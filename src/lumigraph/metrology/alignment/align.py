@@ -111,7 +111,7 @@ class AlignmentStep:
         return self.status in ("aligned", "stopped")
 
     def lines(self) -> tuple[str, ...]:
-        """What is out of place, one line each motor."""
+        """Misalignment with its 95 % interval, one line each motor."""
         return tuple(
             f"{one.moves} {one.shown(self.belief[one.moves])} ± "
             f"{one.shown(SURE * self.belief.error(one.moves), signed=False)}"
@@ -400,7 +400,7 @@ class _Loop:
             )
 
     def back(self, positions: tuple[float, ...]) -> str:
-        """Where the bench was left: at its best place so far, where its motors still obey."""
+        """Return to the best place so far, where motors still obey; says where the bench was left."""
         if self.best is None or self.best[1] == positions:
             return "the bench stands where it was"
         try:

@@ -1,4 +1,4 @@
-r"""What is known about a bench after some exposures: Gaussian, with the motors' play.
+r"""Gaussian belief about a bench after some exposures, with the motors' play.
 
 A motor's carriage stands at :math:`u + s`, u its position and s its slack, :math:`-B/2` after it has gone up
 by the backlash B or more, :math:`B/2` after it has gone down. Both are states, so that moves in two
@@ -33,7 +33,7 @@ _LEVER = 0.03  # m: angles drift by as much as lengths, over this
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Belief:
-    """What is known about a bench.
+    """Gaussian belief about a bench.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class Belief:
     def seen(self, rays: BenchRays, reading: WhiteReading) -> "Belief":
         """Belief after an exposure."""
         noise = _noise(rays, reading)
-        mean = self.mean
+        mean, slopes = self.mean, self._slopes(rays, self.mean)
         for _ in range(_ROUNDS):
             slopes = self._slopes(rays, mean)
             rest = _rest(rays, reading, mean) + slopes @ (mean - self.mean)
@@ -152,7 +152,7 @@ class Belief:
 
 
 def _rest(rays: BenchRays, reading: WhiteReading, mean: np.ndarray) -> np.ndarray:
-    """What is seen less what is expected; by whole lenslets alike where those are not known."""
+    """Measures less expected ones; the origin to the nearest lenslet where whole ones are not known."""
     rest = reading.values - rays.measures(mean[: len(STATES)])
     if reading.lenslets is None:
         basis = reading.values[:4].reshape(2, 2)

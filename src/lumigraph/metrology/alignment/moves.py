@@ -66,7 +66,7 @@ def tolerance(tolerances: Mapping[str, float], state: str) -> float:
 
 
 def undetermined(belief: Belief, rays: BenchRays, tolerances: Mapping[str, float]) -> tuple[str, ...]:
-    """What motors move that is not known to the tolerance, and that another exposure tells no better."""
+    """Names of what motors move that is not known to the tolerance, nor better after another exposure."""
     after, found = belief.expected(rays), []
     for motor in belief.motors:
         error, next_error = belief.error(motor.moves), after.error(motor.moves)

@@ -104,7 +104,7 @@ class SimulatedBench:
         self.seconds += seconds
 
     def truth(self) -> dict[str, float]:
-        """What is out of place now, by `STATES`."""
+        """True misalignment now, by `STATES`."""
         hours = self.seconds / 3600
         found = {name: self.state.get(name, 0.0) + hours * self.drift.get(name, 0.0) for name in STATES}
         for one in self.motors:
@@ -121,8 +121,8 @@ class SimulatedBench:
         bright = _FULL * (1 + self.fading * self.rng.uniform(-1, 1)) / 1.1
         noisy = bright * (light / light.max() + self.noise * self.rng.standard_normal(light.shape))
         black = self.camera.sensor.black_level
-        self._last = np.clip(np.rint(noisy + black), 0, 65535).astype(np.uint16)
-        return self._last
+        self._last = image = np.clip(np.rint(noisy + black), 0, 65535).astype(np.uint16)
+        return image
 
     def light(self, truth: Mapping[str, float]) -> np.ndarray:
         """White image (y, x) without noise, by wave optics."""

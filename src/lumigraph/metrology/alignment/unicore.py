@@ -87,7 +87,7 @@ class _Camera(SimpleCameraDevice):
 
 
 class _Still:
-    """What stages of a simulated bench do not do."""
+    """Stages of a simulated bench, less what they do not do."""
 
     def home(self) -> None:
         raise BenchError("simulated stages have no home")

@@ -36,7 +36,7 @@ function show({ count, name, step }) {
   const slider = at("exposure");
   slider.max = count - 1;
   if (asked === null) slider.value = step.number;
-  at("which").textContent = `${step.number} of ${count}`;
+  at("which").textContent = `${step.number} (0 to ${count - 1})`;
   const key = `${step.number}/${count}`;
   if (key === shown) return;
   shown = key;
