@@ -18,7 +18,7 @@ from lumigraph.metrology.twin import CAUSES, BenchModel, shown
 _STOP = 0.04  # part of the stop by which it is opened and closed, for the width's derivative
 _FARTHEST = 4  # whole lenslets by which an array may be shifted
 _NOISE = 0.0025
-"""Noise of the camera file's white image, of its brightest pixel: some decides which micro-images are used."""
+"""Noise of the camera file's white image, of its brightest pixel: it decides what is used."""
 
 _TILT, _COPIES = 2e-5, 5  # rad by which such an image may err, and how many are averaged at most
 _SATURATED = 1e-3
