@@ -46,7 +46,7 @@ def align(
     camera
         Camera file, or a name of the catalogue: the intended bench.
     log
-        Folder of the steps, by default bench.log beside BENCH. The same command resumes after an interruption.
+        Folder of the steps, by default bench.log beside BENCH. The same command resumes when interrupted.
     dark
         Picture without light; left out, the sensor's black level.
     pitch_error
