@@ -28,6 +28,9 @@ _ROUNDS = 4
 _FAR = (*4 * (3e-4,), *2 * (1e-4,), *2 * (0.06,), 0.02)
 """Errors of `BenchRays.measures`, over how far they are from those of the camera file."""
 
+_ASIDE = 0.05, 2e-3
+"""From an origin so far from that of the camera file on, pixels change the slope by the second [px]."""
+
 _LEVER = 0.03  # m: angles drift by as much as lengths, over this
 
 
@@ -163,4 +166,6 @@ def _rest(rays: BenchRays, reading: WhiteReading, mean: np.ndarray) -> np.ndarra
 def _noise(rays: BenchRays, reading: WhiteReading) -> np.ndarray:
     away = np.abs(reading.values - rays.start)
     away[:4], away[4:6], away[6:8] = away[:4].max(), away[4:6].max(), away[6:8].max()
-    return np.diag(reading.errors**2 + (np.array(_FAR) * away) ** 2)
+    variance = reading.errors**2 + (np.array(_FAR) * away) ** 2
+    variance[6:8] += _ASIDE[1] ** 2 if away[4] > _ASIDE[0] else 0.0
+    return np.diag(variance)
