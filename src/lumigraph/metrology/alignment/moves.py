@@ -151,7 +151,7 @@ def next_moves(
 ) -> tuple[Move, ...]:
     """Moves to where everything is in its place, by what is known.
 
-    A motor may come to its end from two sides. Where some motor will have to move once more in any case, the
+    A motor may come to its end from two sides. Where some motor will probably have to move once more, the
     side is taken whose exposure leaves the least uncertainty of place and backlash; otherwise the side from
     which the end is surest.
 
@@ -167,9 +167,7 @@ def next_moves(
             found = _options(belief, number, positions[number])
             choices.append([(one, _error_after(belief, one)) for one in found])
     allowed = [tolerance(tolerances, belief.motors[some[0][0].number].moves) for some in choices]
-    again = any(
-        _ONE_SIDED * min(e for _, e in some) > most for some, most in zip(choices, allowed, strict=True)
-    )
+    again = any(min(e for _, e in some) > most for some, most in zip(choices, allowed, strict=True))
     if again:
         choices = [[(one, _told(belief, one, rays)) for one, _ in some] for some in choices]
     return tuple(
