@@ -69,7 +69,7 @@ def align(
     from lumigraph import metrology, units
     from lumigraph.instruments import load_camera
     from lumigraph.metrology.datasheet.charts import check_camera
-    from lumigraph.preparation import read_raw
+    from lumigraph.preparation.given import read_raw
 
     hours, pause = (0.0 if text is None else units.parse(text, "time") for text in (watch, every))
     if pause <= 0 or hours < 0:
