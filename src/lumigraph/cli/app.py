@@ -15,6 +15,7 @@ from typing import get_args
 from cyclopts import App, Group
 from cyclopts.exceptions import CycloptsError, MissingArgumentError, UnknownCommandError
 
+from lumigraph.cli.align import align
 from lumigraph.cli.batch import batch
 from lumigraph.cli.board import board
 from lumigraph.cli.calibrate import calibrate
@@ -55,7 +56,7 @@ _LONGEST = 400  # characters of a line on standard error
 GROUPS = {
     "Every day": (process, view, calibrate, decode, render, refocus, depth, deconvolve, simulate),
     "Design and study": (design, information, optimise, tolerance, sweep, wavefront),
-    "Bench and metrology": (measure, board, chart, datasheet, twin),
+    "Bench and metrology": (measure, board, chart, datasheet, twin, align),
     "Many frames": (batch, dataset, convert),
     "Samples and thesis": (demo, samples, catalogue, reproduce),
 }

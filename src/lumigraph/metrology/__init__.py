@@ -6,9 +6,19 @@
 - `load_camera`, `save_camera`: files of COMPOTE (`compote`) and LFToolbox (`lftoolbox`)
 - `triangulate`: positions of points from their micro-images
 - `datasheet`, `read_charts`, `simulate_charts`, `simulated`: measured properties of a camera, on charts
+- `align`, `watch` (`alignment`): a motorised bench aligned in a closed loop, and kept so
 - `twin`, `BenchModel`, `corrected`: misalignment of a bench from white images, and the corrected camera file
 """
 
+from lumigraph.metrology.alignment.align import AlignmentGoal, AlignmentStep, align, watch
+from lumigraph.metrology.alignment.devices import Bench
+from lumigraph.metrology.alignment.drift import drift_rates, drift_table
+from lumigraph.metrology.alignment.log import AlignmentLog
+from lumigraph.metrology.alignment.moves import BenchError
+from lumigraph.metrology.alignment.opening import open_bench
+from lumigraph.metrology.alignment.reading import WhiteReader
+from lumigraph.metrology.alignment.setup import BenchSetup, Motor, read_setup
+from lumigraph.metrology.alignment.simulated import SimulatedBench
 from lumigraph.metrology.boards.calibration import Measured, Pose, board
 from lumigraph.metrology.boards.camera import MetricCamera, Nominal
 from lumigraph.metrology.boards.corners import Board, Corners
@@ -27,23 +37,35 @@ from lumigraph.metrology.twin import BenchModel, Twin, corrected, twin
 
 __all__ = [
     "MEASURES",
+    "AlignmentGoal",
+    "AlignmentLog",
+    "AlignmentStep",
+    "Bench",
+    "BenchError",
     "BenchModel",
+    "BenchSetup",
     "Board",
     "ChartExposures",
     "Charts",
     "Corners",
     "Measured",
     "MetricCamera",
+    "Motor",
     "Nominal",
     "Plan",
     "Pose",
     "SheetEntry",
+    "SimulatedBench",
     "Triangulated",
     "Twin",
+    "WhiteReader",
+    "align",
     "board",
     "chart",
     "corrected",
     "datasheet",
+    "drift_rates",
+    "drift_table",
     "find_corners",
     "is_measure",
     "is_measured",
@@ -51,8 +73,10 @@ __all__ = [
     "load_camera",
     "load_compote",
     "load_corners",
+    "open_bench",
     "plan",
     "read_charts",
+    "read_setup",
     "save",
     "save_camera",
     "save_charts",
@@ -61,6 +85,7 @@ __all__ = [
     "simulated",
     "triangulate",
     "twin",
+    "watch",
 ]
 
 

@@ -25,6 +25,7 @@ from lumigraph.analysis import pupil_edge
 from lumigraph.calibration import calibrate
 from lumigraph.core import checks, upper_floors
 from lumigraph.core.arrays import to_numpy
+from lumigraph.core.calibration import Calibration
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
 from lumigraph.core.result import Quantity
@@ -69,10 +70,16 @@ _FARTHEST = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ShownWhite:
-    """Measures of a white image: two lattice vectors, origin and slope [px], width and blur [px]."""
+    """Measures of a white image: two lattice vectors, origin and slope [px], width and blur [px].
+
+    `reach` is the largest distance of a lenslet from the middle along an axis [px], which the slope refers
+    to; `found` are the micro-images.
+    """
 
     values: np.ndarray
     errors: np.ndarray
+    reach: float = 0.0
+    found: Calibration | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -270,7 +277,7 @@ def shown(white: np.ndarray) -> _ShownWhite:
     edge = pupil_edge(white, found)
     half = [edge.width_error / 1.96, edge.blur_error / 1.96]
     values = np.concatenate([fit.x, [edge.width, edge.blur]])
-    return _ShownWhite(values, np.concatenate([errors, half]))
+    return _ShownWhite(values, np.concatenate([errors, half]), reach, found)
 
 
 def twin(

@@ -7,9 +7,11 @@
 - `layout`: rays through a camera; `microscope_layout`: through an objective
 - `curves`: `curves` over one axis, or `over_depth`; several `images` side by side
 - `volumes`: `projections` and `slices` of a volume
+- `alignments`: steps of a bench's alignment
 - `axes`: axes with lengths in readable units, colour bars
 """
 
+from lumigraph.plots.alignments import alignment, alignment_picture
 from lumigraph.plots.curves import curves, images, over_depth
 from lumigraph.plots.lattices import lattice
 from lumigraph.plots.layout import layout
@@ -19,6 +21,8 @@ from lumigraph.plots.trains import planes
 from lumigraph.plots.volumes import projections, slices
 
 __all__ = [
+    "alignment",
+    "alignment_picture",
     "curves",
     "images",
     "lattice",
