@@ -1,6 +1,6 @@
 """Slopes of the lines of all epipolar-plane images at once, by least squares about a first estimate."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -14,9 +14,9 @@ from lumigraph.depth.expected import LINES, Evidence, contrast, deviation
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Shading, ShadingFit
 from lumigraph.depth.smooth import Stiffness, tears, update
+from lumigraph.depth.sweep import along
 from lumigraph.depth.visible import BEFORE, visible
 from lumigraph.depth.volume import box
-from lumigraph.depth.vote import agreed
 
 _spline: Any = spline_filter
 
@@ -35,26 +35,22 @@ _BESIDE = 2  # px beside an occluder whose differences show its edge
 
 
 def refined(
-    pictures: Pictures, swept: tuple[Sequence[np.ndarray], np.ndarray], shading: Shading, progress: Progress
+    pictures: Pictures, swept: tuple[np.ndarray, np.ndarray], shading: Shading, progress: Progress
 ) -> tuple[np.ndarray, Evidence]:
     """Movements (y, x) in the outermost view [px], refined on all views, and what they rest on.
 
-    `swept` are one or two first maps of movements (y, x), and how far others lie that explain a place as
-    well. Two are both refined on some of the views; each place takes the one that the views agree with, and
-    what is so joined is refined on all.
+    `swept` are a first map of movements (y, x), and how far others lie that explain a place as well. It is
+    refined on some of the views first, then on all.
 
     Each round computes by how much a place should move for every view that sees it, r = g Δ: the residual r
     against the middle view, and the gradient g along the view's own direction. The answers, weighted by what
     they say, are joined by a smooth surface.
     """
-    (maps, rivals), grey = swept, pictures.data.mean(2)
+    (moves, rivals), grey = swept, pictures.data.mean(2)
     lines = _Lines(pictures, _splines(grey, pictures.lit), contrast(grey[pictures.middle]))
-    some = replace(lines, pictures=few(pictures)) if len(maps) > 1 else lines
-    found = [some.moved(one, shading, _JUMPS[0]) for one in maps]
-    moves, left = found[0]
+    some = replace(lines, pictures=few(pictures))
+    moves, left = some.moved(moves, shading, _JUMPS[0])
     progress(0.5)
-    if len(found) > 1:
-        moves = np.where(agreed(pictures, (moves, found[1][0]), left), found[1][0], moves)
     asked = _asked(pictures, lines.splines, moves, left)
     moves = lines.changed(moves, asked, _JUMPS[1])
     progress(1.0)
@@ -66,21 +62,10 @@ def few(pictures: Pictures) -> Pictures:
     lit = np.zeros_like(pictures.lit)
     lit[pictures.middle] = True
     for way in np.ndindex(3, 3):
-        step = np.array(way) - 1
-        if step.any():
-            arm = list(_along(pictures, step))
-            for place in arm[::-2]:
+        if way != (1, 1):
+            for place in along(pictures, way)[::-2]:
                 lit[place] = True
     return replace(pictures, lit=lit)
-
-
-def _along(pictures: Pictures, step: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Lit views in steps from the middle one."""
-    v, u = np.array(pictures.middle) + step
-    while 0 <= v < pictures.lit.shape[0] and 0 <= u < pictures.lit.shape[1]:
-        if pictures.lit[v, u]:
-            yield int(v), int(u)
-        v, u = v + step[0], u + step[1]
 
 
 def _splines(grey: np.ndarray, lit: np.ndarray) -> np.ndarray:
