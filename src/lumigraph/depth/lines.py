@@ -14,47 +14,64 @@ from lumigraph.depth.expected import LINES, Evidence, contrast, deviation
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Shading, ShadingFit
 from lumigraph.depth.smooth import Stiffness, tears, update
-from lumigraph.depth.sweep import along
+from lumigraph.depth.sweep import Swept, along
 from lumigraph.depth.visible import BEFORE, visible
 from lumigraph.depth.volume import box
 
 _spline: Any = spline_filter
 
-_JUMPS = (2.0, 1.2)
-"""Second difference that counts as an edge, round by round [px in the outermost view]."""
-
 _KINK = 4e-3  # px in the outermost view
-_STIFFNESS = 4000.0  # per variance of the noise, and per `_lever`
 _EDGE = 0.003  # contrast between neighbours [of a picture from 0 to 1] where a surface may end
 _USUAL, _AROUND = 1.3, 8  # times the mean contrast within so many px, which is texture
 _LOOSEST = 0.1  # part of its stiffness that a surface keeps at the sharpest edge
 _LEAST_SAID, _WINDOW = 0.15, 3  # of what gradients seem to say; samples to each side that tell it
 _MOST_LEFT = 0.2  # of a picture from 0 to 1: more says only that a place is wrong
-_TEAR = 2.0  # px in the outermost view between neighbours that are not of one surface
 _BESIDE = 2  # px beside an occluder whose differences show its edge
 
 
+@dataclass(frozen=True, slots=True)
+class _Round:
+    """Surface of a round of least squares.
+
+    Parameters
+    ----------
+    jump
+        Second difference that counts as an edge [px in the outermost view].
+    stiffness
+        Per variance of the noise, and per `_lever`.
+    tear
+        Between neighbours that are not of one surface [px in the outermost view].
+    """
+
+    jump: float
+    stiffness: float
+    tear: float
+
+
+_STIFF, _SUPPLE = _Round(2.0, 4000.0, 1.2), _Round(1.2, 600.0, 0.8)
+"""The first round mends what a sweep by narrow windows gets wrong, the second follows leaves."""
+
+
 def refined(
-    pictures: Pictures, swept: tuple[np.ndarray, np.ndarray], shading: Shading, progress: Progress
+    pictures: Pictures, swept: Swept, shading: Shading, progress: Progress
 ) -> tuple[np.ndarray, Evidence]:
     """Movements (y, x) in the outermost view [px], refined on all views, and what they rest on.
 
-    `swept` are a first map of movements (y, x), and how far others lie that explain a place as well. It is
-    refined on some of the views first, then on all.
+    The map of a sweep is refined on some of the views first, then on all.
 
     Each round computes by how much a place should move for every view that sees it, r = g Δ: the residual r
     against the middle view, and the gradient g along the view's own direction. The answers, weighted by what
     they say, are joined by a smooth surface.
     """
-    (moves, rivals), grey = swept, pictures.data.mean(2)
+    grey = pictures.data.mean(2)
     lines = _Lines(pictures, _splines(grey, pictures.lit), contrast(grey[pictures.middle]))
     some = replace(lines, pictures=few(pictures))
-    moves, left = some.moved(moves, shading, _JUMPS[0])
+    moves, left = some.moved(swept.moves, shading, _STIFF)
     progress(0.5)
     asked = _asked(pictures, lines.splines, moves, left)
-    moves = lines.changed(moves, asked, _JUMPS[1])
+    moves = lines.changed(moves, asked, _SUPPLE)
     progress(1.0)
-    return moves, _evidence(lines, asked, moves, rivals)
+    return moves, replace(_evidence(lines, asked, moves, swept.rivals), behind=swept.behind)
 
 
 def few(pictures: Pictures) -> Pictures:
@@ -91,16 +108,16 @@ class _Lines:
         above = np.maximum(self.contrast - _USUAL * usual, 0)
         return np.maximum(np.exp(-above / (_EDGE + usual)), _LOOSEST)
 
-    def moved(self, moves: np.ndarray, shading: Shading, jump: float) -> tuple[np.ndarray, Shading]:
+    def moved(self, moves: np.ndarray, shading: Shading, surface: _Round) -> tuple[np.ndarray, Shading]:
         """A map after a round, and the shading that is left."""
         asked = _asked(self.pictures, self.splines, moves, shading)
-        return self.changed(moves, asked, jump), asked.shading
+        return self.changed(moves, asked, surface), asked.shading
 
-    def changed(self, moves: np.ndarray, asked: "_LineDemand", jump: float) -> np.ndarray:
+    def changed(self, moves: np.ndarray, asked: "_LineDemand", surface: _Round) -> np.ndarray:
         """Map (y, x) moved by the changes that views imply."""
-        stiffness = _STIFFNESS * self.pictures.noise**2 * _lever(self.pictures)
-        how = Stiffness(stiffness, _KINK, jump)
-        change = update(moves, asked.information, asked.pull, how, self._edges, tears(moves, _TEAR)) - moves
+        stiffness = surface.stiffness * self.pictures.noise**2 * _lever(self.pictures)
+        how, torn = Stiffness(stiffness, _KINK, surface.jump), tears(moves, surface.tear)
+        change = update(moves, asked.information, asked.pull, how, self._edges, torn) - moves
         return moves + np.clip(change, -BEFORE, BEFORE)
 
 

@@ -9,12 +9,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, map_coordinates, median_filter
+from scipy.ndimage import gaussian_filter, map_coordinates, median_filter, minimum_filter
 
 from lumigraph.core import memory
 from lumigraph.core.progress import Progress, silent, within
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Shading, ShadingFit
+from lumigraph.depth.visible import BEFORE
 from lumigraph.depth.volume import box, cheapest, guided, rivals, semi_global
 from lumigraph.errors import GeometryError
 
@@ -24,6 +25,8 @@ _MOST_DIFFERENCE = 0.017  # of a picture from 0 to 1: more says only that the la
 _FAR = 0.15  # part of a picture's width that a point may cross from the middle view to the outermost
 _COARSE = 4
 _RADIUS = 1  # px to each side whose costs are joined: as narrow as leaves; of 1, 2, 3 on *rosemary*, *antinous*
+_BEHIND = 8  # px to each side where something farther is seen
+_LIKELY = 0.8  # of the way to it, where both explain a place; fits *rosemary* and *kitchen*, much for *antinous*
 _CROSS = 4  # arms, at most, that each stand for a line of their own
 _ALONG = 1e-6  # px off a diagonal between samples
 _BAND = 1 << 16  # values at a time, which stay in the processor's cache
@@ -46,10 +49,27 @@ def labels(low: float, high: float) -> np.ndarray:
     return (middle + _STEP * np.linspace(-half, half, count + 4)).astype(np.float32)
 
 
-def swept(
-    pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Progress
-) -> tuple[np.ndarray, np.ndarray]:
-    """Movements (y, x) of places in the outermost view [px], to a fraction of a label, and their `rivals`.
+@dataclass(frozen=True, slots=True)
+class Swept:
+    """First map of movements in the outermost view [px], and which others may be right.
+
+    Parameters
+    ----------
+    moves
+        (y, x), to a fraction of a label.
+    rivals
+        How far (y, x) other movements lie that explain a place as well; see `volume.rivals`.
+    behind
+        Error (y, x) to expect because a place may belong to what is seen behind; see `behind`.
+    """
+
+    moves: np.ndarray
+    rivals: np.ndarray
+    behind: np.ndarray
+
+
+def swept(pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Progress) -> Swept:
+    """The map of the least costs, smoothed along the picture's edges and by semi-global matching.
 
     Raises
     ------
@@ -67,7 +87,35 @@ def swept(
     cost = guided(costs(pictures, moves, most, progress, shading), guide, _RADIUS)
     total = semi_global(cost, guide, 0.2 * most, most)
     found = median_filter(moves[0] + cheapest(total) * step, 3)
-    return np.clip(found, moves[0], moves[-1]).astype(np.float32), rivals(total, most) * step
+    found = np.clip(found, moves[0], moves[-1]).astype(np.float32)
+    return Swept(found, rivals(total, most) * step, behind(cost, moves, found, pictures.noise))
+
+
+def behind(cost: np.ndarray, moves: np.ndarray, found: np.ndarray, noise: float) -> np.ndarray:
+    """Error (y, x) to expect of places that may belong to what is seen behind them [px].
+
+    A plain gap between leaves shows nothing of its own depth, and smoothing gives it that of the leaves.
+    Where the farthest movement around explains a place nearly as well as its own, it may be right.
+
+    Parameters
+    ----------
+    cost
+        Of each movement (n,) at each place (n, y, x), before those beside it count.
+    moves
+        Movements (n,).
+    found
+        Map (y, x).
+    noise
+        Of the pictures: so little of a difference between costs is chance.
+    """
+    far = minimum_filter(found, 2 * _BEHIND + 1)
+    own, other = (
+        np.take_along_axis(cost, np.clip(np.rint((one - moves[0]) / (moves[1] - moves[0])), 0, len(moves) - 1)
+        .astype(np.intp)[None], 0)[0]
+        for one in (found, far)
+    )  # fmt: skip
+    away = np.where(found - far > BEFORE, found - far, 0)
+    return _LIKELY * away * np.exp(-np.maximum(other - own, 0) / np.float32(noise))
 
 
 def costs(
