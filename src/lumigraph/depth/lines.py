@@ -20,7 +20,6 @@ from lumigraph.depth.volume import box
 
 _spline: Any = spline_filter
 
-_KINK = 4e-3  # px in the outermost view
 _EDGE = 0.003  # contrast between neighbours [of a picture from 0 to 1] where a surface may end
 _USUAL, _AROUND = 1.3, 8  # times the mean contrast within so many px, which is texture
 _LOOSEST = 0.1  # part of its stiffness that a surface keeps at the sharpest edge
@@ -35,6 +34,8 @@ class _Round:
 
     Parameters
     ----------
+    kink
+        Second difference above which a bend costs its amount and no longer its square [px in the outermost view].
     jump
         Second difference that counts as an edge [px in the outermost view].
     stiffness
@@ -43,12 +44,13 @@ class _Round:
         Between neighbours that are not of one surface [px in the outermost view].
     """
 
+    kink: float
     jump: float
     stiffness: float
     tear: float
 
 
-_STIFF, _SUPPLE = _Round(2.0, 4000.0, 1.2), _Round(1.2, 600.0, 0.8)
+_STIFF, _SUPPLE = _Round(0.05, 2.0, 4000.0, 1.2), _Round(4e-3, 1.2, 600.0, 0.8)
 """The first round mends what a sweep by narrow windows gets wrong, the second follows leaves."""
 
 
@@ -116,7 +118,7 @@ class _Lines:
     def changed(self, moves: np.ndarray, asked: "_LineDemand", surface: _Round) -> np.ndarray:
         """Map (y, x) moved by the changes that views imply."""
         stiffness = surface.stiffness * self.pictures.noise**2 * _lever(self.pictures)
-        how, torn = Stiffness(stiffness, _KINK, surface.jump), tears(moves, surface.tear)
+        how, torn = Stiffness(stiffness, surface.kink, surface.jump), tears(moves, surface.tear)
         change = update(moves, asked.information, asked.pull, how, self._edges, torn) - moves
         return moves + np.clip(change, -BEFORE, BEFORE)
 
