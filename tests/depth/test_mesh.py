@@ -43,7 +43,10 @@ def test_a_mesh_opens_elsewhere_with_its_colours_and_its_area(card, tmp_path):
 def test_faces_are_cut_where_depth_jumps(card, tmp_path):
     lg.save(card, tmp_path / "mesh.ply")
     parts = trimesh.load_mesh(tmp_path / "mesh.ply", process=False).split(only_watertight=False)
-    assert sorted(round(float(part.vertices[:, 2].mean()), 3) for part in parts if len(part.faces) > 2) == [NEAR, FAR]
+    assert sorted(round(float(part.vertices[:, 2].mean()), 3) for part in parts if len(part.faces) > 2) == [
+        NEAR,
+        FAR,
+    ]
 
 
 def test_faces_turn_to_the_camera(card):
@@ -68,7 +71,9 @@ def test_unsure_places_leave_holes():
     mesh = mesh_of(np.full(SHAPE, FAR), trust=trust)
     assert mesh.faces is not None
     assert len(mesh) == 30 * 40 - 2
-    assert len(mesh.faces) == 2 * 29 * 39 - 2 * 8 + 2 * 2  # of the four squares around, two corners stay whole
+    assert (
+        len(mesh.faces) == 2 * 29 * 39 - 2 * 8 + 2 * 2
+    )  # of the four squares around, two corners stay whole
 
 
 def test_a_mesh_survives(card, tmp_path):

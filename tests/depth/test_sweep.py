@@ -97,7 +97,9 @@ def test_a_plain_gap_may_belong_to_what_is_behind(plane):
     assert behind(clear, LABELS, found, 0.01)[10, 8] < 1e-6
 
 
-@pytest.mark.parametrize(("down", "right", "noise"), [(0.3, 0.8, 0.01), (2.5, 1.0, 0.005), (0.15, 0.05, 0.002)])
+@pytest.mark.parametrize(
+    ("down", "right", "noise"), [(0.3, 0.8, 0.01), (2.5, 1.0, 0.005), (0.15, 0.05, 0.002)]
+)
 def test_slanted_ground_shows_no_contours(down, right, noise):
     """Disparities pass many labels of the sweep; a seam 0.2 px off at each would be 2 % of the places."""
     rng = np.random.default_rng(2)

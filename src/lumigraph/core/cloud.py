@@ -29,7 +29,7 @@ class PointCloud:
     Raises
     ------
     GeometryError
-        Shapes that do not belong together, positions that are not finite, or faces of points that are not there.
+        Shapes that do not belong together, positions that are not finite, or faces without their points.
     """
 
     points: Array
@@ -61,10 +61,12 @@ class PointCloud:
         checks.array("faces", given)
         faces = to_numpy(given)
         if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
-            raise GeometryError(f"faces are {faces.dtype} of shape {faces.shape} but must be integers (m, 3).")
+            raise GeometryError(
+                f"faces are {faces.dtype} of shape {faces.shape} but must be integers (m, 3)."
+            )
         if faces.size and not (faces.min() >= 0 and faces.max() < len(self)):
             raise GeometryError(
-                f"faces name points {faces.min()} to {faces.max()} but there are {len(self)}: 0 to {len(self) - 1}."
+                f"faces name points {faces.min()} to {faces.max()} but there are {len(self)}, from 0 on."
             )
 
     @staticmethod

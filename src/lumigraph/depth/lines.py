@@ -35,7 +35,7 @@ class _Round:
     Parameters
     ----------
     kink
-        Second difference above which a bend costs its amount and no longer its square [px in the outermost view].
+        Second difference above which a bend costs its amount, not its square [px in the outermost view].
     jump
         Second difference that counts as an edge [px in the outermost view].
     stiffness

@@ -213,7 +213,7 @@ def cloud(
     grid
         Of a map of the samples of a picture, by `dense`: `lumigraph.rendering.sight_grid`.
     faces
-        Join neighbours by triangles, which makes it a mesh; it is cut where depth jumps, see `mesh.triangles`.
+        Join neighbours by triangles to a mesh, which is cut where depth jumps; see `mesh.triangles`.
 
     Raises
     ------

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates, median_filter, minimum_filter
 
 from lumigraph.core import memory
-from lumigraph.core.progress import Progress, silent, within
+from lumigraph.core.progress import Progress, silent
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Shading, ShadingFit
 from lumigraph.depth.visible import BEFORE
@@ -24,15 +24,21 @@ _MOST_LABELS = 2000
 _MOST_DIFFERENCE = 0.017  # of a picture from 0 to 1: more says only that the label is wrong
 _FAR = 0.15  # part of a picture's width that a point may cross from the middle view to the outermost
 _COARSE = 4
-_RADIUS = 1  # px to each side whose costs are joined: as narrow as leaves; of 1, 2, 3 on *rosemary*, *antinous*
+_RADIUS = (
+    1  # px to each side whose costs are joined: as narrow as leaves; of 1, 2, 3 on *rosemary*, *antinous*
+)
 _BEHIND = 8  # px to each side where something farther is seen
-_LIKELY = 0.8  # of the way to it, where both explain a place; fits *rosemary* and *kitchen*, much for *antinous*
+_LIKELY = (
+    0.8  # of the way to it, where both explain a place; fits *rosemary* and *kitchen*, much for *antinous*
+)
 _CROSS = 4  # arms, at most, that each stand for a line of their own
 _ALONG = 1e-6  # px off a diagonal between samples
 _BAND = 1 << 16  # values at a time, which stay in the processor's cache
 _SLOW = 2.0  # px of the small pictures: what varies over more may be shading
 _DISTANT = 0.5  # power of a view's distance by which it counts; of 0, 0.5, 1, 2 on *antinous* and *cotton*
-_CLEAR = 0.01  # of a picture from 0 to 1: texture with more counts no more, lest plain walls count for nothing
+_CLEAR = (
+    0.01  # of a picture from 0 to 1: texture with more counts no more, lest plain walls count for nothing
+)
 _ENDS = 0.002, 0.998  # parts of the texture between which a sweep searches
 _MODEST = 0.05  # preference for small movements where the views do not say
 
@@ -150,7 +156,7 @@ class _View:
     seen: np.ndarray | None
 
     def difference(self, move: float, rows: slice, most: float) -> np.ndarray:
-        """Difference from rows of the middle view (y, x), to `most`, if all places move by `move`, linearly."""
+        """Difference (y, x) from rows of the middle view, to `most`, if all places move by `move`; linear."""
         corners = self._corners(move)
         (first, _), others = corners[0], corners[1:]
         start = self._read(self.data, first, rows)
@@ -170,7 +176,7 @@ class _View:
         return np.logical_and.reduce(list(corners))
 
     def _corners(self, move: float) -> list[tuple[tuple[int, int], float]]:
-        """Samples (y, x) from a place that a movement falls between, and their parts: along a diagonal two."""
+        """Samples (y, x) that a movement falls between, and their parts: along a diagonal two."""
         (y, x), (down, right) = self.places, (math.floor(move * place) for place in self.places)
         ty, tx = move * y - down, move * x - right
         across = [(0, 0, (1 - ty) * (1 - tx)), (0, 1, (1 - ty) * tx), (1, 0, ty * (1 - tx)), (1, 1, ty * tx)]
@@ -178,8 +184,7 @@ class _View:
             across = [(0, 0, 1 - ty), (1, 1, ty)]
         elif abs(ty + tx - 1) < _ALONG:
             across = [(1, 0, ty), (0, 1, tx)]
-        kept = [((down + i, right + j), part) for i, j, part in across if part > 0]
-        return kept
+        return [((down + i, right + j), part) for i, j, part in across if part > 0]
 
     def _read(self, data: np.ndarray, start: tuple[int, int], rows: slice) -> np.ndarray:
         y, x = rows.start + start[0] + self.pad, start[1] + self.pad

@@ -51,7 +51,7 @@ def pyramid(values: np.ndarray) -> list[np.ndarray]:
 
 
 def describe(volume: Volume, *, times: bool = False) -> dict[str, Any]:
-    """The attribute "ome" of a volume's pyramid, or of a series over time, which has one level; in micrometres."""
+    """The attribute "ome" of a volume's pyramid, or of a series over time, of one level; in micrometres."""
     axes = [{"name": name, "type": "space", "unit": "micrometer"} for name in "zyx"]
     dz, dy, dx = volume.spacing
     first = (volume.depths[0], float(volume.grid.y[0]), float(volume.grid.x[0]))
@@ -98,14 +98,17 @@ def levels(ome: Any) -> list[Level]:
         moves = image.get("coordinateTransformations", ())
         sets = image["datasets"][:_MOST_LEVELS]
         found = [(str(one["path"]), axes, _lengths(one, moves, axes, units)) for one in sets]
-        _ = found[0]
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         raise FormatError(
             f"its OME-Zarr metadata is not a multiscales image of version 0.5: {error!r}."
         ) from error
+    if not found:
+        raise FormatError("its OME-Zarr metadata names no dataset.")
     for name, *_ in found:
         if not re.fullmatch(r"[A-Za-z0-9_\-]+(/[A-Za-z0-9_\-]+)*", name) or axes[-3:] != ("z", "y", "x"):
-            raise FormatError(f"its OME-Zarr axes are {axes} at {name[:40]!r}; only [t, c,] z, y, x are read.")
+            raise FormatError(
+                f"its OME-Zarr axes are {axes} at {name[:40]!r}; only [t, c,] z, y, x are read."
+            )
     return found
 
 
