@@ -20,6 +20,7 @@ from lumigraph.depth.volume import box
 
 _spline: Any = spline_filter
 
+_AGREED = (1.5, 3.0)  # of the noise: what views differ by where a stiff surface fits, and where it does not
 _EDGE = 0.003  # contrast between neighbours [of a picture from 0 to 1] where a surface may end
 _USUAL, _AROUND = 1.3, 8  # times the mean contrast within so many px, which is texture
 _LOOSEST = 0.1  # part of its stiffness that a surface keeps at the sharpest edge
@@ -117,10 +118,17 @@ class _Lines:
 
     def changed(self, moves: np.ndarray, asked: "_LineDemand", surface: _Round) -> np.ndarray:
         """Map (y, x) moved by the changes that views imply."""
-        stiffness = surface.stiffness * self.pictures.noise**2 * _lever(self.pictures)
+        stiffness = _STIFF.stiffness * self.pictures.noise**2 * _lever(self.pictures)
         how, torn = Stiffness(stiffness, surface.kink, surface.jump), tears(moves, surface.tear)
-        change = update(moves, asked.information, asked.pull, how, self._edges, torn) - moves
+        kept = self._edges * self._kept(asked, surface)
+        change = update(moves, asked.information, asked.pull, how, kept, torn) - moves
         return moves + np.clip(change, -BEFORE, BEFORE)
+
+    def _kept(self, asked: "_LineDemand", surface: _Round) -> np.ndarray:
+        """Part (y, x) of the first round's stiffness: all where views agree to the noise, else the round's."""
+        left = box(asked.residual, 1) / self.pictures.noise
+        part = np.clip((left - _AGREED[0]) / (_AGREED[1] - _AGREED[0]), 0, 1)
+        return (surface.stiffness / _STIFF.stiffness) ** part
 
 
 def _evidence(lines: _Lines, asked: "_LineDemand", moves: np.ndarray, rivals: np.ndarray) -> Evidence:

@@ -27,6 +27,7 @@ _COARSE = 4
 _RADIUS = (
     1  # px to each side whose costs are joined: as narrow as leaves; of 1, 2, 3 on *rosemary*, *antinous*
 )
+_MEDIANS = 3, 5  # places across
 _BEHIND = 8  # px to each side where something farther is seen
 _LIKELY = (
     0.8  # of the way to it, where both explain a place; fits *rosemary* and *kitchen*, much for *antinous*
@@ -92,8 +93,7 @@ def swept(pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Pro
     guide = pictures.center.mean(0)
     cost = guided(costs(pictures, moves, most, progress, shading), guide, _RADIUS)
     total = semi_global(cost, guide, 0.2 * most, most)
-    found = median_filter(moves[0] + cheapest(total) * step, 3)
-    found = np.clip(found, moves[0], moves[-1]).astype(np.float32)
+    found = _settled(cost, moves, moves[0] + cheapest(total) * step, pictures.noise)
     return Swept(found, rivals(total, most) * step, behind(cost, moves, found, pictures.noise))
 
 
@@ -115,13 +115,22 @@ def behind(cost: np.ndarray, moves: np.ndarray, found: np.ndarray, noise: float)
         Of the pictures: so little of a difference between costs is chance.
     """
     far = minimum_filter(found, 2 * _BEHIND + 1)
-    own, other = (
-        np.take_along_axis(cost, np.clip(np.rint((one - moves[0]) / (moves[1] - moves[0])), 0, len(moves) - 1)
-        .astype(np.intp)[None], 0)[0]
-        for one in (found, far)
-    )  # fmt: skip
+    dearer = _cost_at(cost, moves, far) - _cost_at(cost, moves, found)
     away = np.where(found - far > BEFORE, found - far, 0)
-    return _LIKELY * away * np.exp(-np.maximum(other - own, 0) / np.float32(noise))
+    return _LIKELY * away * np.exp(-np.maximum(dearer, 0) / np.float32(noise))
+
+
+def _settled(cost: np.ndarray, moves: np.ndarray, found: np.ndarray, noise: float) -> np.ndarray:
+    """A map (y, x) less the islands of a few places that fit no better than what is around them."""
+    narrow, wide = (np.clip(median_filter(found, width), moves[0], moves[-1]) for width in _MEDIANS)
+    better = _cost_at(cost, moves, wide) - _cost_at(cost, moves, narrow) > noise
+    return np.where(better, narrow, wide).astype(np.float32)
+
+
+def _cost_at(cost: np.ndarray, moves: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Cost (y, x) of the label next to a movement (y, x)."""
+    nearest = np.rint((found - moves[0]) / (moves[1] - moves[0])).astype(np.intp)
+    return np.take_along_axis(cost, np.clip(nearest, 0, len(moves) - 1)[None], 0)[0]
 
 
 def costs(
