@@ -51,7 +51,7 @@ class _Round:
     tear: float
 
 
-_STIFF, _SUPPLE = _Round(0.05, 2.0, 4000.0, 1.2), _Round(4e-3, 1.2, 600.0, 0.8)
+_STIFF, _SUPPLE = _Round(0.05, 2.0, 4000.0, 1.2), _Round(4e-3, 1.2, 2000.0, 1.2)
 """The first round mends what a sweep by narrow windows gets wrong, the second follows leaves."""
 
 

@@ -24,10 +24,8 @@ _MOST_LABELS = 2000
 _MOST_DIFFERENCE = 0.017  # of a picture from 0 to 1: more says only that the label is wrong
 _FAR = 0.15  # part of a picture's width that a point may cross from the middle view to the outermost
 _COARSE = 4
-_RADIUS = (
-    1  # px to each side whose costs are joined: as narrow as leaves; of 1, 2, 3 on *rosemary*, *antinous*
-)
-_MEDIANS = 3, 5  # places across
+_RADIUS = 2  # px to each side whose costs are joined; 1 leaves islands on smooth ground
+_MEDIANS = 3, 7  # places across
 _BEHIND = 8  # px to each side where something farther is seen
 _LIKELY = (
     0.8  # of the way to it, where both explain a place; fits *rosemary* and *kitchen*, much for *antinous*
