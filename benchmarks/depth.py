@@ -55,6 +55,8 @@ SCENES: dict[str, Callable[[], tuple[lg.LightField, np.ndarray]]] = {
     "cotton, 9 views": lambda: star("cotton", 9),
     "kitchen, 33 views": lambda: star("kitchen"),
     "kitchen, 9 views": lambda: star("kitchen", 9),
+    "rosemary, 33 views": lambda: star("rosemary"),
+    "rosemary, 9 views": lambda: star("rosemary", 9),
 }
 
 

@@ -17,7 +17,7 @@ def test_the_page_about_depth_runs():
     names = {}
     exec(block, names)
     assert np.median(names["found"].values) == pytest.approx(0.4, abs=0.005)
-    assert len(names["points"]) > 1000
+    assert len(names["mesh"].faces) > 1000
 
 
 def test_the_example_finds_the_square_where_it_stands(tmp_path, monkeypatch, capsys):

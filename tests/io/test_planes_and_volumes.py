@@ -23,7 +23,7 @@ from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
-from lumigraph.errors import FormatError
+from lumigraph.errors import FormatError, SamplingWarning
 from lumigraph.io import ngff, ome, source
 
 GRID = Grid((5, 6), (2e-6 / 3, 0.5e-6), (1e-6, -2e-6))
@@ -173,11 +173,44 @@ def test_a_volume_is_an_ome_zarr_for_others(tmp_path, rng):
     assert array.metadata.dimension_names == ("c", "z", "y", "x")
     np.testing.assert_array_equal(array[...], np.moveaxis(volume.data, -1, 0))
     # What it tells others is what we would read of it, were it theirs.
-    name, axes, lengths = ngff.level(group.attrs["ome"])
+    name, axes, lengths = ngff.levels(group.attrs["ome"])[0]
     other = ngff.volume(np.asarray(array), axes, lengths)
     assert (name, other.depths) == ("0", pytest.approx(volume.depths))
     np.testing.assert_allclose(other.grid.y, GRID.y)
     np.testing.assert_allclose(other.grid.x, GRID.x)
+
+
+def test_a_large_volume_is_a_pyramid(tmp_path, rng):
+    """Each level shows the same light in the same place: its mean, its middle, its centre of mass."""
+    grid = Grid((301, 520), (0.5e-6, 0.4e-6), (1e-6, 0))
+    volume = Volume(rng.random((3, 301, 520)).astype(np.float32), grid, (-3e-6, 0.0, 5e-6))
+    volume.data[1, 100:104, 200:204] = 500
+    io.save(volume, tmp_path / "v.ome.zarr")
+    group = zarr.open_group(tmp_path / "v.ome.zarr", mode="r")
+    levels = ngff.levels(group.attrs["ome"])
+    shapes = [group[name].shape for name, *_ in levels]
+    assert shapes == [(3, 301, 520), (3, 151, 260), (3, 76, 130)]
+    assert sorted(group.array_keys()) == ["0", "1", "2"]
+    for name, axes, lengths in levels:
+        one = ngff.volume(np.asarray(group[name]), axes, lengths)
+        assert one.data.mean() == pytest.approx(volume.data.mean(), rel=0.02)  # odd ends count twice
+        bright = np.where(one.data[1] > 99, one.data[1], 0)
+        middle = (bright.sum(1) @ one.grid.y / bright.sum(), bright.sum(0) @ one.grid.x / bright.sum())
+        assert middle == pytest.approx((grid.y[100:104].mean(), grid.x[200:204].mean()), abs=1e-9)
+    np.testing.assert_array_equal(io.open(tmp_path / "v.ome.zarr").data, volume.data)
+
+
+def test_the_finest_level_that_may_be_read_is_opened(tmp_path, rng):
+    volume = Volume(rng.integers(0, 255, (2, 300, 300), np.uint8), Grid((300, 300), 1e-6), (0.0, 5e-6))
+    io.save(volume, tmp_path / "v.zarr")
+    with pytest.warns(SamplingWarning, match="level 1 of 2 is opened, 2 x 150 x 150"):
+        coarse = io.open(tmp_path / "v.zarr", max_pixels=30_000)
+    assert coarse.data.dtype == np.uint8
+    assert coarse.depths == volume.depths
+    assert coarse.grid.pitch == pytest.approx((2e-6, 2e-6))
+    assert coarse.grid.y[0] == pytest.approx(volume.grid.y[:2].mean())
+    with pytest.raises(FormatError, match="at most 1e\\+03 are read"):
+        io.open(tmp_path / "v.zarr", max_pixels=1000)
 
 
 def foreign(folder, axes, shape, scale, **level):

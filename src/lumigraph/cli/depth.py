@@ -171,7 +171,7 @@ def depth(
 
     Example: `lumigraph depth raw.png --calibration maker.xml --method correlation -o patches.tiff`
 
-    Example: `lumigraph depth raw.tiff --camera camera.toml -o points.ply`
+    Example: `lumigraph depth raw.tiff --camera camera.toml -o mesh.ply`
 
     Parameters
     ----------
@@ -179,9 +179,10 @@ def depth(
         Views (.zarr, .h5, a folder), or a raw image.
     output
         Map (.pfm, .tiff, .zarr), its picture, near to far as white to black, as fine as 'lumigraph refocus'
-        makes pictures of the views (.png), or points in space (.ply). With a camera file (a microscope's too)
-        or --focal-length depths from the focused plane [m], positive farther from the objective; else
-        disparities [px per view], positive nearer, refocus factors, or patches [px].
+        makes pictures of the views (.png), or points in space, joined to a mesh that is cut where depth jumps
+        (.ply). With a camera file (a microscope's too) or --focal-length depths from the focused plane [m],
+        positive farther from the objective; else disparities [px per view], positive nearer, refocus
+        factors, or patches [px].
     confidence
         File for the confidence of each place, from 0 to 1.
     min_confidence
@@ -289,7 +290,7 @@ def _save(made: _Measured, output: Path, points: tuple[float | None, float]) -> 
         picture = None if picture is None else np.clip(picture / (np.quantile(picture, 0.999) or 1), 0, 1)
         cloud = verbs.cloud(
             found, made.grounds, object_distance=points[0], colours=picture, min_confidence=points[1],
-            grid=made.grid,
+            grid=made.grid, faces=True,
         )  # fmt: skip
         io.save(cloud, output)
     elif name.endswith(".png"):

@@ -1,4 +1,4 @@
-"""Points in space with colours."""
+"""Points in space with colours, and the triangles between them."""
 
 from dataclasses import dataclass
 
@@ -22,16 +22,20 @@ class PointCloud:
         (n, 3) red, green, blue: uint8, or floats from 0 to 1; None for none.
     confidence
         (n,), higher is better; None where unknown.
+    faces
+        Triangles (m, 3) of a mesh: numbers of their points, counter-clockwise as the camera sees them; None
+        for points alone.
 
     Raises
     ------
     GeometryError
-        Shapes that do not belong together, or positions that are not finite.
+        Shapes that do not belong together, positions that are not finite, or faces without their points.
     """
 
     points: Array
     colours: Array | None = None
     confidence: Array | None = None
+    faces: Array | None = None
 
     __repr__ = brief
     _repr_html_ = table
@@ -47,9 +51,23 @@ class PointCloud:
             self._check_colours(to_numpy(self.colours))
         if self.confidence is not None:
             _check_shape("confidence", self.confidence, shape[:1])
+        if self.faces is not None:
+            self._check_faces(self.faces)
 
     def __len__(self) -> int:
         return int(self.points.shape[0])
+
+    def _check_faces(self, given: Array) -> None:
+        checks.array("faces", given)
+        faces = to_numpy(given)
+        if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
+            raise GeometryError(
+                f"faces are {faces.dtype} of shape {faces.shape} but must be integers (m, 3)."
+            )
+        if faces.size and not (faces.min() >= 0 and faces.max() < len(self)):
+            raise GeometryError(
+                f"faces name points {faces.min()} to {faces.max()} but there are {len(self)}, from 0 on."
+            )
 
     @staticmethod
     def _check_colours(colours: Array) -> None:

@@ -12,6 +12,7 @@ from lumigraph.core.cloud import PointCloud
 from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.grid import Grid
 from lumigraph.core.lightfield import LightField
+from lumigraph.depth.mesh import triangles
 from lumigraph.depth.quantities import alpha_of
 from lumigraph.design import thin_lens
 from lumigraph.errors import CalibrationError, GeometryError
@@ -189,6 +190,7 @@ def cloud(
     colours: Array | None = None,
     min_confidence: float = 0.5,
     grid: Grid | None = None,
+    faces: bool = False,
 ) -> PointCloud:
     """Points (z, y, x) in space [m] of a map of depths; the main lens' middle is the origin.
 
@@ -210,6 +212,8 @@ def cloud(
         outermost view if that is less, and 0.55 px of `dense`.
     grid
         Of a map of the samples of a picture, by `dense`: `lumigraph.rendering.sight_grid`.
+    faces
+        Join neighbours by triangles to a mesh, which is cut where depth jumps; see `mesh.triangles`.
 
     Raises
     ------
@@ -221,9 +225,10 @@ def cloud(
     distance = to_numpy(depth.values).astype(float) + checks.positive("object_distance", object_distance)
     trust = to_numpy(depth.confidence)
     kept = np.isfinite(distance) & (trust >= min_confidence)
-    points = np.stack([distance, y * distance / separation, x * distance / separation], -1)[kept]
+    points = np.stack([distance, y * distance / separation, x * distance / separation], -1)
     paint = None if colours is None else _painted(colours, depth.shape)[kept]
-    return PointCloud(points.astype(np.float32), paint, trust[kept].astype(np.float32))
+    joined = triangles(points, kept, depth.usual_error or 0.0) if faces else None
+    return PointCloud(points[kept].astype(np.float32), paint, trust[kept].astype(np.float32), joined)
 
 
 def _places(

@@ -1,7 +1,8 @@
 """OME-Zarr (NGFF 0.5): how other programs learn a volume's axes, units and sizes.
 
 J. Moore et al., *OME-Zarr: a cloud-optimized bioimaging file format*, Histochem. Cell Biol. 160, 223 (2023);
-specification 0.5, section "multiscales". One level is written; of several the first, the finest, is read.
+specification 0.5, section "multiscales". Each level has half the samples of the one before along y and x,
+until a plane fits a screen; planes stay, which are few. The finest level that may be read is read.
 """
 
 import re
@@ -15,7 +16,10 @@ from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
 
 LEVEL = "0"
-"""Name of the array."""
+"""Name of the finest array."""
+
+_SIDE = 256  # samples along y and x of a plane that needs no coarser level
+_MOST_LEVELS = 32
 
 _UNITS = {
     "meter": 1.0, "centimeter": 1e-2, "millimeter": 1e-3, "micrometer": 1e-6, "nanometer": 1e-9,
@@ -33,8 +37,21 @@ def names(volume: Volume) -> tuple[str, ...]:
     return ("c", "z", "y", "x")[4 - len(volume.data.shape) :]
 
 
+def pyramid(values: np.ndarray) -> list[np.ndarray]:
+    """Levels of data ([c, ]z, y, x), the finest first: means of 2 x 2 samples, of one or two at odd ends."""
+    levels = [values]
+    while max(levels[-1].shape[-2:]) > _SIDE:
+        fine = levels[-1]
+        wider = [(0, 0)] * (fine.ndim - 2) + [(0, n % 2) for n in fine.shape[-2:]]
+        even = np.pad(fine, wider, "edge")
+        pairs = even.reshape(*even.shape[:-2], even.shape[-2] // 2, 2, even.shape[-1] // 2, 2)
+        mean = pairs.mean((-3, -1), dtype=np.result_type(fine.dtype, np.float32))
+        levels.append((np.rint(mean) if fine.dtype.kind in "iu" else mean).astype(fine.dtype))
+    return levels
+
+
 def describe(volume: Volume, *, times: bool = False) -> dict[str, Any]:
-    """The attribute "ome" of a volume, or of a series of them over time; lengths in micrometres."""
+    """The attribute "ome" of a volume's pyramid, or of a series over time, of one level; in micrometres."""
     axes = [{"name": name, "type": "space", "unit": "micrometer"} for name in "zyx"]
     dz, dy, dx = volume.spacing
     first = (volume.depths[0], float(volume.grid.y[0]), float(volume.grid.x[0]))
@@ -44,13 +61,30 @@ def describe(volume: Volume, *, times: bool = False) -> dict[str, Any]:
         axes, scale, shift = [{"name": "c", "type": "channel"}, *axes], [1.0, *scale], [0.0, *shift]
     if times:
         axes, scale, shift = [{"name": "t", "type": "time"}, *axes], [1.0, *scale], [0.0, *shift]
-    place = [{"type": "scale", "scale": scale}, {"type": "translation", "translation": shift}]
-    level = {"path": LEVEL, "coordinateTransformations": place}
-    return {"version": "0.5", "multiscales": [{"name": "volume", "axes": axes, "datasets": [level]}]}
+    sides, levels = volume.data.shape[1:3], []
+    while not levels or (not times and max(sides) * 2 ** (1 - len(levels)) > _SIDE):
+        levels.append(_placed(scale, shift, len(levels)))
+    return {
+        "version": "0.5",
+        "multiscales": [{"name": "volume", "axes": axes, "datasets": levels, "type": "mean"}],
+    }
 
 
-def level(ome: Any) -> tuple[str, tuple[str, ...], dict[str, tuple[float, float]]]:
-    """Finest level: the array's name, its axes, and (scale, first position) [m] of z, y and x.
+def _placed(scale: list[float], shift: list[float], number: int) -> dict[str, Any]:
+    """A level's name, the sizes of its samples, and the middle of its first one."""
+    step = 2**number
+    coarse = [*scale[:-2], *(step * one for one in scale[-2:])]
+    middle = [a + (step - 1) / 2 * b for a, b in zip(shift[-2:], scale[-2:], strict=True)]
+    first = {"type": "translation", "translation": [*shift[:-2], *middle]}
+    return {"path": str(number), "coordinateTransformations": [{"type": "scale", "scale": coarse}, first]}
+
+
+Level = tuple[str, tuple[str, ...], dict[str, tuple[float, float]]]
+"""The array's name, its axes, and (scale, first position) [m] of z, y and x."""
+
+
+def levels(ome: Any) -> list[Level]:
+    """Levels of an image, the finest first.
 
     Raises
     ------
@@ -61,28 +95,38 @@ def level(ome: Any) -> tuple[str, tuple[str, ...], dict[str, tuple[float, float]
         image = ome["multiscales"][0]
         axes = tuple(axis["name"] for axis in image["axes"])
         units = [_UNITS.get(axis.get("unit"), 1e-6) for axis in image["axes"]]
-        first = image["datasets"][0]
-        place, moves = str(first["path"]), [*image.get("coordinateTransformations", ())]
-        steps = [*first["coordinateTransformations"], *moves]
-        scale, shift = np.ones(len(axes)), np.zeros(len(axes))
-        for step in steps:
-            if step["type"] == "scale":
-                factor = np.asarray(step["scale"], float)
-                scale, shift = scale * factor, shift * factor
-            elif step["type"] == "translation":
-                shift = shift + np.asarray(step["translation"], float)
-        lengths = {
-            axis: (checks.positive(axis, abs(float(a * unit))), checks.finite(axis, float(b * unit)))
-            for axis, a, b, unit in zip(axes, scale, shift, units, strict=True)
-            if axis in "zyx"
-        }
+        moves = image.get("coordinateTransformations", ())
+        sets = image["datasets"][:_MOST_LEVELS]
+        found = [(str(one["path"]), axes, _lengths(one, moves, axes, units)) for one in sets]
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         raise FormatError(
             f"its OME-Zarr metadata is not a multiscales image of version 0.5: {error!r}."
         ) from error
-    if not re.fullmatch(r"[A-Za-z0-9_\-]+(/[A-Za-z0-9_\-]+)*", place) or axes[-3:] != ("z", "y", "x"):
-        raise FormatError(f"its OME-Zarr axes are {axes} at {place[:40]!r}; only [t, c,] z, y, x are read.")
-    return place, axes, lengths
+    if not found:
+        raise FormatError("its OME-Zarr metadata names no dataset.")
+    for name, *_ in found:
+        if not re.fullmatch(r"[A-Za-z0-9_\-]+(/[A-Za-z0-9_\-]+)*", name) or axes[-3:] != ("z", "y", "x"):
+            raise FormatError(
+                f"its OME-Zarr axes are {axes} at {name[:40]!r}; only [t, c,] z, y, x are read."
+            )
+    return found
+
+
+def _lengths(
+    dataset: Any, moves: Any, axes: tuple[str, ...], units: list[float]
+) -> dict[str, tuple[float, float]]:
+    scale, shift = np.ones(len(axes)), np.zeros(len(axes))
+    for step in [*dataset["coordinateTransformations"], *moves]:
+        if step["type"] == "scale":
+            factor = np.asarray(step["scale"], float)
+            scale, shift = scale * factor, shift * factor
+        elif step["type"] == "translation":
+            shift = shift + np.asarray(step["translation"], float)
+    return {
+        axis: (checks.positive(axis, abs(float(a * unit))), checks.finite(axis, float(b * unit)))
+        for axis, a, b, unit in zip(axes, scale, shift, units, strict=True)
+        if axis in "zyx"
+    }
 
 
 def volume(values: np.ndarray, axes: tuple[str, ...], lengths: dict[str, tuple[float, float]]) -> Volume:

@@ -1,6 +1,7 @@
-"""PLY: a cloud of points with colours; binary little-endian is written, ASCII and both byte orders are read.
+"""PLY: points with colours, and the triangles of a mesh; ASCII and both byte orders are read.
 
-G. Turk, *The PLY Polygon File Format* (1994). Only the element "vertex" is read; a mesh's faces are left.
+Binary little-endian is written. G. Turk, *The PLY Polygon File Format* (1994). Faces are read where all of
+them are triangles in a binary file that follow the points, as most programs write them; else they are left.
 """
 
 import io
@@ -19,11 +20,12 @@ _TYPES = {
     "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
 }  # fmt: skip
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
+_FACE = ("<u1", "<i4")  # how many corners a face has, and each of them, as written
 _COLOURS, _LONGEST = ("red", "green", "blue"), 1 << 14
 
 
 def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> PointCloud:
-    """The points of a PLY file.
+    """Points of a PLY file, and its triangles.
 
     Raises
     ------
@@ -44,11 +46,14 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> PointCloud:
         file.readline(8)
         with source.decoding(path, "a PLY"):
             table = _table(path, file, order, count, kind)
-            return _cloud(table)
+            return _cloud(table, _faces(path, file, header.decode("ascii", "replace"), max_pixels))
 
 
 def save(cloud: PointCloud, path: Path) -> None:
-    """Write points: float32 x, y, z, then uint8 red, green, blue and float32 confidence where known."""
+    """Write points: float32 x, y, z, then uint8 red, green, blue and float32 confidence where known.
+
+    Faces follow, each as the number of its corners, 3, and int32 numbers of points.
+    """
     points = to_numpy(cloud.points)
     kind = [(name, "<f4") for name in "xyz"]
     kind += [(name, "u1") for name in _COLOURS] if cloud.colours is not None else []
@@ -65,8 +70,42 @@ def save(cloud: PointCloud, path: Path) -> None:
         table["confidence"] = to_numpy(cloud.confidence)
     names = [f"property {'uchar' if form == 'u1' else 'float'} {name}" for name, form in kind]
     lines = ["ply", "format binary_little_endian 1.0", "comment x right, y down, z away from the camera"]
-    lines += [f"element vertex {len(table)}", *names, "end_header", ""]
-    target.write_bytes(path, "\n".join(lines).encode() + table.tobytes())
+    lines += [f"element vertex {len(table)}", *names]
+    faces = np.zeros(0 if cloud.faces is None else len(cloud.faces), _face_type(*_FACE))
+    if cloud.faces is not None:
+        faces["count"], faces["corners"] = 3, to_numpy(cloud.faces)
+        lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+    lines += ["end_header", ""]
+    target.write_bytes(path, "\n".join(lines).encode() + table.tobytes() + faces.tobytes())
+
+
+def _face_type(count: str, corner: str) -> np.dtype:
+    return np.dtype([("count", count), ("corners", corner, 3)])
+
+
+def _faces(path: Path, file: io.BufferedReader, header: str, max_pixels: int) -> np.ndarray | None:
+    """Triangles (m, 3) that follow the points; None where there are none, or other polygons."""
+    lines = [line.split() for line in header.splitlines()]
+    after = [k for k, words in enumerate(lines) if words[:1] == ["element"]][1:2]
+    if not after or lines[after[0]][1:2] != ["face"]:
+        return None
+    words = lines[after[0]]
+    properties = [line for line in lines[after[0] + 1 :] if line[:1] in (["property"], ["element"])]
+    mine = properties[: next((k for k, line in enumerate(properties) if line[0] == "element"), None)]
+    order = next(_ORDERS[line[1]] for line in lines if line[:1] == ["format"])
+    if not order or len(mine) != 1 or mine[0][1:2] != ["list"] or len(mine[0]) != 5 or len(words) != 3:
+        return None
+    if not words[2].isascii() or not words[2].isdecimal() or not {mine[0][2], mine[0][3]} <= set(_TYPES):
+        return None
+    count, kind = int(words[2]), _face_type(*(order + _TYPES[name] for name in mine[0][2:4]))
+    source.check_size(path, (count, 1), max_pixels)
+    content = file.read(count * kind.itemsize)
+    table = np.frombuffer(content, kind, len(content) // kind.itemsize)
+    if len(table) and (table["count"] != 3).any():
+        return None  # polygons: shorter or longer than triangles
+    if len(table) < count:
+        raise FormatError(f"{path} is cut short: {len(table)} of {count} faces are there. Copy it.")
+    return table["corners"].astype(np.int32) if table["corners"].dtype.kind in "iu" else None
 
 
 def _declared(path: Path, header: str) -> tuple[str, int, list[tuple[str, str]]]:
@@ -108,7 +147,7 @@ def _table(
     return table
 
 
-def _cloud(table: np.ndarray) -> PointCloud:
+def _cloud(table: np.ndarray, faces: np.ndarray | None) -> PointCloud:
     names = table.dtype.names or ()
     wide = "f8" if table["x"].dtype.itemsize == 8 else "f4"
     points = np.stack([table[name].astype(wide) for name in "zyx"], -1)
@@ -118,4 +157,4 @@ def _cloud(table: np.ndarray) -> PointCloud:
             raise FormatError("its colours lie outside 0 ... 255.")
         colours = colours.astype(np.uint8)
     confidence = np.asarray(table["confidence"], np.float32) if "confidence" in names else None
-    return PointCloud(points, colours, confidence)
+    return PointCloud(points, colours, confidence, faces)

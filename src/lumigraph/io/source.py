@@ -128,12 +128,16 @@ def check_size(path: Path, shape: tuple[int, ...], max_pixels: int) -> None:
     """
     if min(shape, default=0) < 1:
         raise FormatError(f"{path} has no pixels: its header says {_times(shape)}. The file is damaged.")
-    pixels = prod(shape[:2]) * ceil(prod(shape[2:]) / 4) if len(shape) < 4 else ceil(prod(shape) / 4)
-    if pixels > max_pixels:
+    if (count := pixels(shape)) > max_pixels:
         raise FormatError(
-            f"{path} declares {_times(shape)} = {pixels:.3g} pixels but at most {max_pixels:.3g} are read. "
-            f"If that is right, call lumigraph.io.open(path, max_pixels={pixels})."
+            f"{path} declares {_times(shape)} = {count:.3g} pixels but at most {max_pixels:.3g} are read. "
+            f"If that is right, call lumigraph.io.open(path, max_pixels={count})."
         )
+
+
+def pixels(shape: tuple[int, ...]) -> int:
+    """Pixels of data (rows, columns[, channels]) or of more axes; four channels count as one."""
+    return prod(shape[:2]) * ceil(prod(shape[2:]) / 4) if len(shape) < 4 else ceil(prod(shape) / 4)
 
 
 def nominal_indices(path: Path, lattice: Lattice, shape: tuple[int, int]) -> np.ndarray:

@@ -6,6 +6,7 @@ Volumes are OME-Zarr (NGFF 0.5), which microscopy programs open; those by other 
 import warnings
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from lumigraph.core.depth_map import DepthMap
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.core.volume import Volume
-from lumigraph.errors import FormatError
+from lumigraph.errors import FormatError, SamplingWarning
 from lumigraph.io import header, ngff, series, source, target, zarr_chunks
 
 _SIDE = 1024  # pixels of a chunk along each axis of a raw image
@@ -76,13 +77,18 @@ def save(thing: RawImage | LightField | Volume | DepthMap, path: Path) -> None:
         _save_light_field(thing, path)
     elif isinstance(thing, Volume):
         data, names = ngff.data(to_numpy(thing.data)), ngff.names(thing)
-        chunks = tuple(min(n, side) for n, side in zip(data.shape[-3:], _SIDES, strict=True))
         attributes = {**header.describe_volume(thing), "ome": ngff.describe(thing)}
-        _write(path, [(ngff.LEVEL, data, (1,) * (data.ndim - 3) + chunks, names, {})], attributes)
+        arrays = [(str(k), one, _chunks(one.shape), names, {}) for k, one in enumerate(ngff.pyramid(data))]
+        _write(path, arrays, attributes)
     elif isinstance(thing, DepthMap):
         _save_depth(thing, path)
     else:
         _save_raw(thing, path)
+
+
+def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Sides of the chunks of a level ([c, ]z, y, x)."""
+    return (1,) * (len(shape) - 3) + tuple(min(n, side) for n, side in zip(shape[-3:], _SIDES, strict=True))
 
 
 def _save_raw(raw: RawImage, path: Path) -> None:
@@ -168,9 +174,12 @@ def _noun(path: Path, group: zarr.Group, max_pixels: int) -> RawImage | LightFie
             raise FormatError(
                 f"{path} was not written by lumigraph and is not OME-Zarr 0.5. Only those stores are read."
             )
-        name, axes, scales = ngff.level(found["ome"])
+        name, axes, scales = _finest(path, group, found["ome"], max_pixels)
         return ngff.volume(_values(path, group, name, max_pixels), axes, scales)
     if found.get("kind") == "Volume":
+        if "ome" in found and (level := _finest(path, group, found["ome"], max_pixels))[0] != ngff.LEVEL:
+            coarse = ngff.volume(_values(path, group, level[0], max_pixels), *level[1:])
+            return replace(coarse, depths=tuple(found["depths"]))  # which need not be evenly spaced
         values = _values(path, group, ngff.LEVEL, max_pixels)
         restored = header.restore_planes(np.moveaxis(values, 0, -1) if values.ndim == 4 else values, found)
         assert isinstance(restored, Volume)  # restore_planes goes by the kind
@@ -187,6 +196,30 @@ def _noun(path: Path, group: zarr.Group, max_pixels: int) -> RawImage | LightFie
     if found.get("kind") == "RawImage":
         return header.restore(data, found, None)
     raise FormatError(f"{path} holds a {found.get('kind')!r}, which this lumigraph does not know.")
+
+
+def _finest(path: Path, group: zarr.Group, ome: Any, max_pixels: int) -> ngff.Level:
+    """The finest level of an image that may be read; the finest of all if none may.
+
+    Warns
+    -----
+    SamplingWarning
+        It is a coarser one.
+    """
+    found = ngff.levels(ome)
+    for level in found:
+        array = group.get(level[0])
+        if isinstance(array, zarr.Array) and source.pixels(array.shape) <= max_pixels:
+            if level is not found[0]:
+                warnings.warn(
+                    f"{path} holds more pixels than the {max_pixels:.3g} that are read: level {level[0]} of "
+                    f"{len(found)} is opened, {' x '.join(map(str, array.shape))}. Call lumigraph.io.open "
+                    "with max_pixels= for a finer one.",
+                    SamplingWarning,
+                    stacklevel=2,
+                )
+            return level
+    return found[0]
 
 
 def _values(path: Path, group: zarr.Group, name: str, max_pixels: int) -> np.ndarray:
