@@ -70,7 +70,7 @@ def seen_from(found, place):
         whole = [math.floor(one) for one in corner]
         moved = np.zeros((both.shape[0] + 1, both.shape[1] + 1, 4))
         moved[:-1, :-1] = both
-        moved = shift(moved, (corner[0] - whole[0], corner[1] - whole[1], 0), order=1)
+        moved = shift(moved, (corner[0] - whole[0], corner[1] - whole[1], 0), order=1, mode="grid-constant")
         rows, columns = (
             slice(max(0, w), min(n, w + m)) for w, n, m in zip(whole, GRID.shape, moved.shape, strict=False)
         )
@@ -83,16 +83,16 @@ def seen_from(found, place):
 
 @pytest.mark.parametrize("place", [(0.0, 0.0), (1.1e-3, -0.7e-3), (-0.3e-3, 1.7e-3)])
 def test_places_of_the_lens_see_what_the_renderer_sees(layers, cards, place):
-    (view,) = raytraced.Tracer.of(cards).views(GRID, CAMERA.object_distance, [place], 64, 9)
+    (view,) = raytraced.Tracer.of(cards).views(GRID, CAMERA.object_distance, [place], 128, 9)
     true = view.light.reshape(60, 2, 80, 2, 3).mean((1, 3))
     found = seen_from(layers, place)
     inner = slice(2, -2)
     off = np.sqrt(np.mean((found - true)[inner, inner] ** 2) / np.mean(true**2))
-    assert off < 0.035  # noise of the rays, and edges
+    assert off < 0.032  # noise of the rays is 0.020
 
 
 def test_truth_is_that_of_the_middle(layers):
-    assert layers.depth[30, 60] == pytest.approx(0.05, abs=1e-5)
+    assert layers.depth[3, 3] == pytest.approx(0.05, abs=1e-5)
     near = 30 - 0 + round((5e-4 / 0.16 * 0.2 - GRID.center[0]) / 1e-4)
     across = 40 + round((1e-3 / 0.16 * 0.2 - GRID.center[1]) / 1e-4)
     assert layers.depth[near, across] == pytest.approx(-0.04, abs=1e-5)
@@ -111,7 +111,7 @@ def test_gloss_is_told():
     lamp = {"type": "sphere", "center": [0.02, -0.02, 0.1], "radius": 6e-3,
             "emitter": {"type": "area", "radiance": 30.0}}  # fmt: skip
     wide = SimpleNamespace(object_distance=0.2, pupil_diameter=0.02)
-    with pytest.warns(SamplingWarning, match=r"surfaces' light changes by \d+ % rms over the main lens"):
+    with pytest.warns(SamplingWarning, match=r"surfaces' light changes by [\d.]+ % rms over the main lens"):
         found = lg.scene.mitsuba(room(ball=ball, lamp=lamp), wide, Grid.square(40, 1e-4), samples=16)
     assert found.glossy > 0.02
 
@@ -154,7 +154,6 @@ def test_a_raw_image_shows_the_scene_from_a_file(tmp_path):
     )
     camera = lg.PlenopticCamera.model_validate(
         {
-            "kind": "plenoptic",
             "wavelength": "550 nm",
             "object_distance": "200 mm",
             "main_lens": {"focal_length": "100 mm"},
@@ -162,7 +161,7 @@ def test_a_raw_image_shows_the_scene_from_a_file(tmp_path):
             "sensor": {"pixel_pitch": "20 um"},
         }
     )
-    found = lg.scene.mitsuba(file, camera, planes=1, across=3)
+    found = lg.scene.mitsuba(file, camera, planes=1, across=3, samples=64)
     raw, white = (lg.simulate(camera, one).data for one in (found.scene, lg.targets.white()))
     middle = slice(10, 15)
-    assert raw[middle, middle].mean() == pytest.approx(0.5 * white[middle, middle].mean(), rel=0.02)
+    assert raw[middle, middle].mean() == pytest.approx(0.5 * white[middle, middle].mean(), rel=0.01)

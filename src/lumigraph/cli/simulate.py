@@ -201,7 +201,9 @@ class SceneOptions:
         if self.medium is None and (self.medium_depth is not None or self.medium_index != "difference"):
             raise FormatError("--medium-depth and --medium-index have no meaning without --medium.")
         if self.planes is not None and self.depth_map is None and not self._rendered():
-            raise FormatError("--planes has no meaning without --depth-map or a rendered scene. Leave it out.")
+            raise FormatError(
+                "--planes has no meaning without --depth-map or a rendered scene. Leave it out."
+            )
         if self.depth_map is not None:
             if len(self.scene or []) != 1:
                 raise FormatError(f"--depth-map is of one --scene, not {len(self.scene or [])}. Give one.")
@@ -231,7 +233,9 @@ class SceneOptions:
             return lit + targets.points([_point(text) for text in self.point]) if self.point else lit
         depths = (self._depths() or [0.0]) * (len(names) if len(self._depths()) < 2 else 1)
         parts = [
-            (self._raytraced(name, camera, colour, seed) if name.endswith(".xml") else _scene(name, grid)).at(dz)
+            (self._raytraced(name, camera, colour, seed) if name.endswith(".xml") else _scene(name, grid)).at(
+                dz
+            )
             for name, dz in zip(names, depths, strict=True)
         ]
         if self.point:

@@ -26,6 +26,9 @@ from lumigraph.scene.volumes import Scene, Slice
 FINER = 2
 """Rays' pixels along each axis of a sample, so that edges have parts of samples."""
 
+MORE = 8
+"""Times as many rays for the first view, the middle one, whose light is the truth."""
+
 GLOSSY = 0.01
 """Change of surfaces' light over the main lens, relative rms, from which a warning says it."""
 
@@ -262,11 +265,11 @@ class Tracer:
         where = self.renderer.load_dict({"type": "aov", "aovs": "p:position,n:sh_normal"})
         axes = self.pose[:3, :3] / np.linalg.norm(self.pose[:3, :3], axis=0)
         for k, place in enumerate(places):
-            sensor = self._sensor(grid, focus, place, axes)
-            count, own = max(1, samples // FINER**2), seed * len(places) + k
-            picture = np.array(self.renderer.render(self.scene, sensor=sensor, integrator=path,
-                                                    spp=count, seed=own))  # fmt: skip
-            told = np.array(self.renderer.render(self.scene, sensor=sensor, integrator=where, spp=1, seed=own))
+            count = max(1, samples // FINER**2) * (MORE if k == 0 else 1)
+            own = int(np.random.SeedSequence([seed, k]).generate_state(1)[0] >> 1)
+            both = {"scene": self.scene, "sensor": self._sensor(grid, focus, place, axes), "seed": own}
+            picture = np.array(self.renderer.render(**both, integrator=path, spp=count))
+            told = np.array(self.renderer.render(**both, integrator=where, spp=1))
             position, normals = told[..., :3] - self.pose[:3, 3], told[..., 3:6]
             distance = (position @ axes[:, 2]).astype(np.float32)
             distance[~normals.any(-1)] = np.inf
@@ -367,7 +370,8 @@ class Layers:
             self._light[k][window] += light
             self._cover[k][window] += cover
             self._most[k][window] = np.maximum(self._most[k][window], cover)
-        self._change.add(view, self._followed(view.place))
+        if view is not self.middle:  # which has less noise than the others
+            self._change.add(view, self._followed(view.place))
 
     def _followed(self, place: tuple[float, float]) -> np.ndarray:
         """Pixels (2, ny, nx) of a view at which it would see what the pixels of the middle one see."""
@@ -397,8 +401,8 @@ class Layers:
         whole, nowhere = view.light.sum(), view.light[~np.isfinite(view.distance)].sum()
         if nowhere > LEFT_OPEN * whole:
             raise GeometryError(
-                f"{100 * nowhere / whole:.2g} % of the light comes from nowhere (an environment), but waves need "
-                "a distance. Close the scene with a backdrop."
+                f"{100 * nowhere / whole:.2g} % of the light comes from nowhere (an environment), but waves "
+                "need a distance. Close the scene with a backdrop."
             )
 
     def finished(self, colour: bool) -> RaytracedScene:
@@ -406,8 +410,8 @@ class Layers:
         glossy, noise = self._change.found()
         if glossy > GLOSSY:
             warnings.warn(
-                f"surfaces' light changes by {100 * glossy:.2g} % rms over the main lens (gloss); slices keep "
-                "its mean.",
+                f"surfaces' light changes by {100 * glossy:.2g} % rms over the main lens (gloss); slices "
+                "keep its mean.",
                 SamplingWarning,
                 stacklevel=3,
             )
@@ -451,8 +455,9 @@ class Layers:
     def _visibility(self) -> np.ndarray:
         """Part of the lens that sees each place that its middle sees (y, x)."""
         numbers = np.max(_blocks(self._numbers), axis=(1, 3))
-        inner = slice(self._around, self._around + self.grid.shape[0]), slice(
-            self._around, self._around + self.grid.shape[1]
+        inner = (
+            slice(self._around, self._around + self.grid.shape[0]),
+            slice(self._around, self._around + self.grid.shape[1]),
         )
         found = np.zeros(self.grid.shape, np.float32)
         for k in range(len(self.inverse)):
@@ -468,7 +473,9 @@ class Layers:
         """Median depth of each sample's pixels: no depth that stands between two things."""
         blocks = np.moveaxis(_blocks(self.middle.distance), 2, 1).reshape(*self.grid.shape, FINER**2)
         nearest = np.sort(blocks, axis=-1)[..., (FINER**2 - 1) // 2]
-        return np.where(np.isfinite(nearest), nearest - self.camera.object_distance, np.nan).astype(np.float32)
+        return np.where(np.isfinite(nearest), nearest - self.camera.object_distance, np.nan).astype(
+            np.float32
+        )
 
 
 class Change:
@@ -499,7 +506,7 @@ class Change:
         self._places.append(view.place)
 
     def found(self) -> tuple[float, float]:
-        """Change that a plane over the lens explains, less what noise alone would; and the noise.
+        """Change that a plane over the lens explains beyond noise and chance, and the noise.
 
         Relative rms, where all views see the same.
         """
@@ -511,12 +518,14 @@ class Change:
         planes = down**2 / spread[0] + across**2 / spread[1]
         rest = max(0.0, float((squares - light**2 / views - planes).mean())) / (views - 3)
         level = max(float((light**2).mean()) / views**2, 1e-30)
-        glossy = max(0.0, float(planes.mean()) - 2 * rest) / views / level
+        chance = 3 * float(planes.std()) / math.sqrt(planes.size)
+        excess = float(planes.mean()) - 2 * rest
+        glossy = excess / views / level if excess > chance else 0.0
         return math.sqrt(glossy), math.sqrt(rest / views / level)
 
 
 def _coarser(picture: np.ndarray, away: float) -> np.ndarray:
-    """Means over samples along the first axis, of pixels moved by less than a sample [px]; one sample more."""
+    """Means over samples along the first axis, of pixels moved by less than a sample [px]: one more."""
     count, whole = len(picture) // FINER + 1, math.floor(away)
     moved = np.zeros((count * FINER, *picture.shape[1:]), picture.dtype)
     for first, weight in ((whole, 1 - away + whole), (whole + 1, away - whole)):
