@@ -83,12 +83,12 @@ def seen_from(found, place):
 
 @pytest.mark.parametrize("place", [(0.0, 0.0), (1.1e-3, -0.7e-3), (-0.3e-3, 1.7e-3)])
 def test_places_of_the_lens_see_what_the_renderer_sees(layers, cards, place):
-    (view,) = raytraced.Tracer.of(cards).views(GRID, CAMERA.object_distance, [place], 128, 9)
+    (view,) = raytraced.Tracer.of(cards).views(GRID, CAMERA.object_distance, [place], 64, 9)
     true = view.light.reshape(60, 2, 80, 2, 3).mean((1, 3))
     found = seen_from(layers, place)
     inner = slice(2, -2)
     off = np.sqrt(np.mean((found - true)[inner, inner] ** 2) / np.mean(true**2))
-    assert off < 0.032  # noise of the rays is 0.020
+    assert off < 0.036  # noise of the rays is 0.020
 
 
 def test_truth_is_that_of_the_middle(layers):
@@ -162,6 +162,8 @@ def test_a_raw_image_shows_the_scene_from_a_file(tmp_path):
         }
     )
     found = lg.scene.mitsuba(file, camera, planes=1, across=3, samples=64)
-    raw, white = (lg.simulate(camera, one).data for one in (found.scene, lg.targets.white()))
-    middle = slice(10, 15)
-    assert raw[middle, middle].mean() == pytest.approx(0.5 * white[middle, middle].mean(), rel=0.01)
+    (part,) = found.scene.parts
+    even = lg.Scene([lg.Slice(np.full(part.grid.shape, 0.5, np.float32), part.grid)])
+    raw, like = (lg.simulate(camera, one).data for one in (found.scene, even))
+    middle = slice(5, 20)
+    assert raw[middle, middle] == pytest.approx(like[middle, middle], rel=0.02)
