@@ -160,8 +160,9 @@ class SceneOptions:
     Parameters
     ----------
     scene
-        white, usaf1951, siemens_star, gratings, slanted_edge, edge, pinhole, chessboard, photo, or a picture
-        file; may be given several times.
+        white, usaf1951, siemens_star, gratings, slanted_edge, edge, pinhole, chessboard, photo, a picture
+        file, or a scene of the renderer Mitsuba 3 (.xml, lengths in metres), whose sensor the main lens takes
+        the place of. May be given several times.
     depth
         Depth of each scene from the focused plane, such as '10 mm' (farther) or '-10 mm' (nearer). With
         --depth-map two: of white, and of black.
@@ -169,7 +170,7 @@ class SceneOptions:
         Depths of the one picture that is given as --scene, which then hides what is behind it: metres from
         the focused plane (.pfm, .tiff), or a picture, white for the first --depth and black for the second.
     planes
-        Opaque slices that --depth-map is sorted into, 1 to 64; 8 if left out.
+        Opaque slices that --depth-map is sorted into, 1 to 64; 8 if left out; or a rendered scene, 16.
     medium
         Refracting volume before the scene, for light-field microscopes: refractive indices (OME-TIFF,
         .zarr, .h5), as --medium-index says. Each point and each lit sample then has an image of its own.
@@ -199,8 +200,10 @@ class SceneOptions:
             )
         if self.medium is None and (self.medium_depth is not None or self.medium_index != "difference"):
             raise FormatError("--medium-depth and --medium-index have no meaning without --medium.")
-        if self.planes is not None and self.depth_map is None:
-            raise FormatError("--planes has no meaning without --depth-map. Leave it out.")
+        if self.planes is not None and self.depth_map is None and not self._rendered():
+            raise FormatError(
+                "--planes has no meaning without --depth-map or a rendered scene. Leave it out."
+            )
         if self.depth_map is not None:
             if len(self.scene or []) != 1:
                 raise FormatError(f"--depth-map is of one --scene, not {len(self.scene or [])}. Give one.")
@@ -217,8 +220,11 @@ class SceneOptions:
     def _depths(self) -> list[float]:
         return lengths("--depth", self.depth)
 
-    def built(self, camera: "Instrument") -> "Scene":
-        """Everything together, before a camera."""
+    def _rendered(self) -> bool:
+        return any(name.endswith(".xml") for name in self.scene or [])
+
+    def built(self, camera: "Instrument", *, colour: bool = False, seed: int = 0) -> "Scene":
+        """Everything together, before a camera; rendered scenes in colour or grey, from rays of a seed."""
         from lumigraph.scene import Scene, targets
 
         grid, names = camera.scene_grid, self.scene or []
@@ -226,10 +232,26 @@ class SceneOptions:
             lit = self._with_depths(camera, self.depth_map)
             return lit + targets.points([_point(text) for text in self.point]) if self.point else lit
         depths = (self._depths() or [0.0]) * (len(names) if len(self._depths()) < 2 else 1)
-        parts = [_scene(name, grid).at(dz) for name, dz in zip(names, depths, strict=True)]
+        parts = [
+            (self._raytraced(name, camera, colour, seed) if name.endswith(".xml") else _scene(name, grid)).at(
+                dz
+            )
+            for name, dz in zip(names, depths, strict=True)
+        ]
         if self.point:
             parts.append(targets.points([_point(text) for text in self.point]))
         return sum(parts, Scene())
+
+    def _raytraced(self, name: str, camera: "Instrument", colour: bool, seed: int) -> "Scene":
+        """Layers of a rendered scene."""
+        from lumigraph.instruments.capabilities import WithMainLens
+        from lumigraph.scene import mitsuba
+
+        if not isinstance(camera, WithMainLens):
+            raise FormatError(f"--scene {name} is for cameras: before a microscope there is no main lens.")
+        planes = 16 if self.planes is None else self.planes
+        with progress("render") as shown:
+            return mitsuba(name, camera, planes=planes, colour=colour, seed=seed, progress=shown).scene
 
     def refracting(self, camera: "Instrument") -> "Medium | None":
         """Medium through which the scene is imaged."""
@@ -327,7 +349,8 @@ def simulate(
         raise FormatError(f"--seed is {seed} but must be at least 0.")
     described = load_camera(camera)
     coherence, spectrum = light.chosen(seed, described), light.spectrum(described)
-    scene, medium = stage.built(described), stage.refracting(described)
+    scene = stage.built(described, colour=light.colours is not None, seed=seed)
+    medium = stage.refracting(described)
     try:
         with progress("simulate") as shown, light.unasked():
             raw = simulate(described, scene, coherence, spectrum=spectrum, progress=shown, medium=medium)

@@ -2,7 +2,7 @@
 
 - `volumes`: `Scene` and its parts: `Slice`, `Points`, `Diffuser`
 - `targets`: test charts as scenes: pinhole, edge, USAF-1951, gratings, star, chessboard, photo
-- `usaf`: the chart USAF-1951; `rgbd`: pictures with depths as opaque slices
+- `usaf`: the chart USAF-1951; `rgbd`: pictures with depths as opaque slices; `raytraced`: a renderer's scenes
 - `sources`: waves: `plane_wave`, `point_source`, `gaussian_beam`
 - `schell`, `extended`: partially coherent light as modes: `GaussianSchell`, `ExtendedSource`
 - `lamps`: shapes of extended sources
@@ -14,6 +14,7 @@ from lumigraph.scene import sources, targets
 from lumigraph.scene.extended import ExtendedSource
 from lumigraph.scene.line import SpectralLine
 from lumigraph.scene.medium import Medium
+from lumigraph.scene.raytraced import RaytracedScene, mitsuba
 from lumigraph.scene.schell import GaussianSchell
 from lumigraph.scene.volumes import Diffuser, Points, Scene, Slice
 
@@ -23,9 +24,11 @@ __all__ = [
     "GaussianSchell",
     "Medium",
     "Points",
+    "RaytracedScene",
     "Scene",
     "Slice",
     "SpectralLine",
+    "mitsuba",
     "sources",
     "targets",
 ]
