@@ -75,9 +75,7 @@ def test_pictures_stay_on_their_array_library(views):
     assert isinstance(picture, torch.Tensor)
     picture.sum().backward()
     assert data.grad is not None
-    assert float(data.grad.sum()) == pytest.approx(
-        picture.numel(), rel=1e-6
-    )  # of a mean
+    assert float(data.grad.sum()) == pytest.approx(picture.numel(), rel=1e-6)  # of a mean
 
 
 @pytest.mark.parametrize(

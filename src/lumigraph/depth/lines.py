@@ -125,7 +125,7 @@ class _Lines:
         return moves + np.clip(change, -BEFORE, BEFORE)
 
     def _kept(self, asked: "_LineDemand", surface: _Round) -> np.ndarray:
-        """Part (y, x) of the first round's stiffness: all where views agree to the noise, else the round's."""
+        """Part (y, x) of the first round's stiffness: all where views agree to noise, else the round's."""
         left = box(asked.residual, 1) / self.pictures.noise
         part = np.clip((left - _AGREED[0]) / (_AGREED[1] - _AGREED[0]), 0, 1)
         return (surface.stiffness / _STIFF.stiffness) ** part

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt, map_coordinates
@@ -80,7 +80,7 @@ class RaytracedScene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """What a point of the main lens sees of the scene, at pixels of the focused plane.
+    """Picture that a point of the main lens sees of the scene, at pixels of the focused plane.
 
     Parameters
     ----------
@@ -199,9 +199,21 @@ def lens_places(diameter: float, across: int) -> list[tuple[float, float]]:
     return sorted(both, key=lambda one: math.hypot(*one))
 
 
+@runtime_checkable
+class CameraWithField(Protocol):
+    """Protocol of cameras that know the samples of their field in the focused plane."""
+
+    @property
+    def scene_grid(self) -> Grid:
+        """Samples of the focused plane."""
+        ...
+
+
 def _field(camera: SeeingCamera) -> Grid:
-    """The camera's field, at most 1024 samples along an axis."""
-    whole: Grid = getattr(camera, "scene_grid")  # noqa: B009 - instruments have it
+    """Grid of the camera's field, at most 1024 samples along an axis."""
+    if not isinstance(camera, CameraWithField):
+        raise GeometryError(f"{type(camera).__name__} has no scene_grid. Give the grid of the field.")
+    whole = camera.scene_grid
     coarser = max(1, math.ceil(max(whole.shape) / 1024))
     ny, nx = (max(1, n // coarser) for n in whole.shape)
     return Grid((ny, nx), (whole.pitch[0] * coarser, whole.pitch[1] * coarser), whole.center)
@@ -258,7 +270,7 @@ class Tracer:
         samples: int,
         seed: int,
     ) -> Iterator[View]:
-        """What each place on the lens sees, at `FINER` pixels for each sample along an axis."""
+        """Pictures that places on the lens see, at `FINER` pixels for each sample along an axis."""
         light = self.scene.integrator()
         kind = {"type": "path", "max_depth": 8} if light is None else light
         path = self.renderer.load_dict(kind) if isinstance(kind, dict) else kind
@@ -345,7 +357,6 @@ class Layers:
         self._most = np.zeros((count, *shape), np.float32)
         self._change = Change(self.middle)
         self._places: list[tuple[float, float]] = []
-        self._numbers = self.numbers(self.middle)
 
     def numbers(self, view: View) -> np.ndarray:
         """Slice of each pixel of a view; -1 where nothing is."""
@@ -423,7 +434,7 @@ class Layers:
         normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
         return RaytracedScene(
             Scene(parts), self.grid, light if colour else light @ LUMINANCE, depth, normals,
-            self._visibility(), glossy, noise,
+            self._mean(self._change.visibility()), glossy, noise,
         )  # fmt: skip
 
     def _slice(self, k: int, colour: bool) -> Slice | None:
@@ -452,20 +463,6 @@ class Layers:
         dz = float(1 / self.inverse[k] - self.camera.object_distance)
         return Slice(shown.astype(np.float32), even, dz, opacity).trimmed()
 
-    def _visibility(self) -> np.ndarray:
-        """Part of the lens that sees each place that its middle sees (y, x)."""
-        numbers = np.max(_blocks(self._numbers), axis=(1, 3))
-        inner = (
-            slice(self._around, self._around + self.grid.shape[0]),
-            slice(self._around, self._around + self.grid.shape[1]),
-        )
-        found = np.zeros(self.grid.shape, np.float32)
-        for k in range(len(self.inverse)):
-            mine = numbers == k
-            most = np.maximum(self._most[k][inner][mine], 1e-3)
-            found[mine] = self._cover[k][inner][mine] / most / len(self._places)
-        return np.minimum(found, 1.0)
-
     def _mean(self, picture: np.ndarray) -> np.ndarray:
         return _blocks(picture).mean((1, 3))
 
@@ -492,6 +489,7 @@ class Change:
         shape = middle.distance.shape
         self._sums = np.zeros((4, *shape))  # of light, its square, light times y and times x
         self._seen = np.isfinite(middle.distance)
+        self._asked, self._alike = np.ones(shape, np.float32), np.isfinite(middle.distance).astype(np.float32)
         self._places: list[tuple[float, float]] = []
 
     def add(self, view: View, at: np.ndarray) -> None:
@@ -499,11 +497,18 @@ class Change:
         light = map_coordinates(view.light @ LUMINANCE, at, order=1, mode="constant", cval=np.nan)
         distance = map_coordinates(view.distance, np.nan_to_num(at), order=0, mode="constant", cval=np.nan)
         with np.errstate(invalid="ignore"):
-            self._seen &= np.abs(distance / self.middle.distance - 1) < ALIKE
+            same = np.abs(distance / self.middle.distance - 1) < ALIKE
+        self._asked += ~np.isnan(distance)
+        self._alike += same
+        self._seen &= same
         light = np.nan_to_num(light)
         self._sums += np.stack([light, light**2, view.place[0] * light, view.place[1] * light])
         self._seen &= light > 0
         self._places.append(view.place)
+
+    def visibility(self) -> np.ndarray:
+        """Part of the views, whose frame holds a place, that see it (ny, nx)."""
+        return self._alike / self._asked
 
     def found(self) -> tuple[float, float]:
         """Change that a plane over the lens explains beyond noise and chance, and the noise.
