@@ -13,7 +13,8 @@ import time
 from pathlib import Path
 
 SERVER = """
-from lumigraph.viewer import Resource, Site, serve
+from lumigraph.viewer import Site, serve
+from lumigraph.viewer.server import Resource
 picture = Resource("application/octet-stream", bytes(200_000))
 page = Resource("text/html", bytes(5000))
 serve(Site({"": page, "picture": picture}), ready=lambda at: print(at, flush=True))

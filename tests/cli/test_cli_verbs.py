@@ -22,7 +22,7 @@ from lumigraph.instruments import load_camera
 VERBS = (
     "process", "view", "calibrate", "decode", "render", "refocus", "depth", "deconvolve", "simulate",
     "design", "information", "optimise", "tolerance", "sweep", "wavefront",
-    "measure", "board", "chart", "datasheet", "twin",
+    "measure", "board", "chart", "datasheet", "twin", "align",
     "batch", "dataset", "convert",
     "demo", "samples", "catalogue", "reproduce",
 )  # fmt: skip

@@ -97,8 +97,7 @@ def test_every_verb_says_in_one_line_what_the_picture_implies_about_the_camera_f
     (tmp_path / "differs.toml").write_text(table.replace('"8 um"', '"8.16 um"'))
     said = microscope(*VERBS[verb], "--camera", "agrees.toml")
     assert said.code == 0, said.err
-    told = "by the camera file it has 12.500 px (square): they agree"
-    assert (said.out.count(told), said.err.count(told)) == (1, 0)
+    assert "by the camera file" not in said.out + said.err  # where they agree nothing is said
     said = microscope(*VERBS[verb], "--camera", "differs.toml", "--overwrite")
     assert said.code == 0, said.err
     implied = "a relay of 1.02 instead of 1" if verb != "render" else "pixels of 8 µm instead of 8.16 µm"

@@ -58,7 +58,7 @@ def test_a_lattice_is_moved_by_numbers():
 
 @pytest.mark.parametrize("data", [None, "x", 5, [[1, 2], [3, 4]]])
 def test_nouns_hold_arrays(data):
-    grid, told = Grid.square(2, 1.0), r"must be an array\. Use numpy\.asarray"
+    grid, told = Grid.square(2, 1.0), r"must be an array\. (Use numpy\.asarray|Read the file)"
     with pytest.raises(GeometryError, match=told):
         Field(data, grid, 5e-7)
     with pytest.raises(FormatError, match=told):

@@ -54,23 +54,23 @@ def slope(function, tensor, along, step):
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("change", "off"),
     [
-        {"lenslets": {"layout": "hex"}},
-        {"model": "exact", "main_lens": {"aberrations": {}}},
-        {"lenslets": {"single": {5: {"focal_change": 0.02}, 24: {"focal_change": 0.03}}}},
+        ({"lenslets": {"layout": "hex"}}, 2e-4),  # simulate chooses its nodes anew at each depth
+        ({"model": "exact", "main_lens": {"aberrations": {}}}, 1e-6),
+        ({"lenslets": {"single": {5: {"focal_change": 0.02}, 24: {"focal_change": 0.03}}}}, 1e-6),
     ],
     ids=["hexagons", "exact", "single lenslets"],
 )
 @pytest.mark.filterwarnings("ignore:an accuracy of")
-def test_raw_images_are_those_of_simulate(change):
+def test_raw_images_are_those_of_simulate(change, off):
     camera = SMALL.replace(**change)
     model = lg.torch.Camera(camera, accuracy=1e-2)
     given = lg.Points(np.array(PLACES)[:, :3], np.array(PLACES)[:, 3])
     with torch.no_grad():
         found = model(given)[0].numpy()
     known = lg.simulate(camera, Scene([given]), lg.Incoherent(1e-2)).data
-    assert np.linalg.norm(found - known) < 1e-6 * np.linalg.norm(known)  # simulate's are of single precision
+    assert np.linalg.norm(found - known) < off * np.linalg.norm(known)  # simulate's are of single precision
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,8 @@ import pytest
 
 SERVER = """
 import sys
-from lumigraph.viewer import Resource, Site, connections, serve
+from lumigraph.viewer import Site, connections, serve
+from lumigraph.viewer.server import Resource
 connections.MOST, connections.TO_REQUEST, connections.TO_PROGRESS = (float(word) for word in sys.argv[1:])
 large = Resource("application/octet-stream", bytes(64 << 20))
 serve(Site({"": Resource("text/html", b"page"), "large": large}), ready=lambda at: print(at, flush=True))

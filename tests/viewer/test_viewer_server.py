@@ -245,7 +245,8 @@ def test_a_taken_port_is_told():
 
 def test_it_listens_on_the_loopback_interface_alone_and_ends_with_ctrl_c():
     code = (
-        "from lumigraph.viewer import Resource, Site, serve\n"
+        "from lumigraph.viewer import Site, serve\n"
+        "from lumigraph.viewer.server import Resource\n"
         "serve(Site({'': Resource('text/html', b'page')}), ready=lambda a: print(a, flush=True))"
     )
     with subprocess.Popen(
@@ -300,7 +301,7 @@ def test_a_browser_is_given_a_private_file_and_not_the_address(tmp_path, monkeyp
 
 
 def test_the_file_for_the_browser_goes_when_the_program_ends(tmp_path):
-    program = "import sys; from pathlib import Path; from lumigraph.viewer import redirecting; "
+    program = "import sys; from pathlib import Path; from lumigraph.viewer.address import redirecting; "
     program += "print(redirecting('http://a/', Path(sys.argv[1])).is_file())"
     run = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True)
     assert run.stdout == "True\n"

@@ -117,7 +117,8 @@ def _shown_live(folder: Path) -> None:
     """Serve the page of a log in a thread of its own, and print its address."""
     import threading
 
-    from lumigraph.viewer import open_in_browser, serve
+    from lumigraph.viewer import serve
+    from lumigraph.viewer.show import open_in_browser
     from lumigraph.viewer.alignment import alignment_site
 
     def ready(address: str) -> None:

@@ -46,7 +46,7 @@ class PupilMask:
     Examples
     --------
     >>> mask = PupilMask(2e-3, opening=((0.5, 0.5), (0.5, 0.5)))
-    >>> float(mask.amplitude(np.zeros(1), np.zeros(1))[0]), round(mask.area, 6)
+    >>> round(float(mask.amplitude(np.zeros(1), np.zeros(1))[0]), 6), round(mask.area, 6)
     (0.5, 0.25)
     """
 

@@ -130,7 +130,7 @@ def unknown_depth(
     --------
     >>> import lumigraph as lg
     >>> camera = lg.load_camera("thesis-2f").replace(sensor={"shape": (48, 48)})
-    >>> scenes = lg.information.Scenes(50e-6, 8)
+    >>> scenes = lg.information.Scenes(25e-6, 8)
     >>> one, three = (
     ...     lg.information.unknown_depth(camera, depths, scenes).value
     ...     for depths in ([0.0], [-8e-3, 0.0, 8e-3])

@@ -18,7 +18,7 @@ APART, SLIT = 200 * um, 20 * um
 RATIOS = (0.1, 0.5, 1.0, 1.5)
 """Width of the lamp times its angle to the slits, over λ: 1 is equation 3.5's limit."""
 
-GRID = Grid((1, 512), (SLIT, 2 * um))
+GRID, LINE = Grid((1, 512), (SLIT, 2 * um)), Grid((1, 512), (20 * mm, 2 * um))
 _PAD = 3.0
 
 
@@ -64,9 +64,9 @@ def fringes(width: float) -> tuple[np.ndarray, np.ndarray]:
     lamp = ExtendedSource.rectangle((1e-9, width / 2 / LAMP), LAMP)
     modes = lamp.modes(GRID, WAVELENGTH, accuracy=1e-3)
     open_ = (np.abs(np.abs(GRID.x) - APART / 2) <= SLIT / 2).astype(float)
-    # A slit is a line: along y the wave stays as it is, for the distance of a window that repeats.
-    screen = Propagate(SCREEN, "band_limited", _PAD, grid=Grid((1, 1536), GRID.pitch))
-    light = modes.through(lambda field: screen(Field(field.data * open_, GRID, WAVELENGTH))).intensity
+    # A slit is a line: along y the wave stays as it is, in a window so tall that no band of it is narrow.
+    screen = Propagate(SCREEN, "band_limited", _PAD, grid=Grid((1, 1536), LINE.pitch))
+    light = modes.through(lambda field: screen(Field(field.data * open_, LINE, WAVELENGTH))).intensity
     return screen.grid.x if screen.grid else GRID.x, np.asarray(light)[0]
 
 
