@@ -118,8 +118,8 @@ def _shown_live(folder: Path) -> None:
     import threading
 
     from lumigraph.viewer import serve
-    from lumigraph.viewer.show import open_in_browser
     from lumigraph.viewer.alignment import alignment_site
+    from lumigraph.viewer.show import open_in_browser
 
     def ready(address: str) -> None:
         console.line(address)
