@@ -72,8 +72,9 @@ def _found(
 
 def _rows(dz: float, finest: float, limit: float, contrasts: dict[float, float]) -> list[ResultRow]:
     expected = 0.0 if limit < min(contrasts) else min(limit, max(contrasts))
-    # Elements are a sixth of an octave apart. Contrast 0.2 ends up to two below the band limit, or one above.
-    low, high = 2 ** (-2.1 / 6), 2 ** (1.1 / 6)
+    # Elements are a sixth of an octave apart. Contrast 0.2 ends up to two below the band limit, or one above;
+    # in focus two, where bars finer than a pair of lenslets may still fall on them in turn.
+    low, high = 2 ** (-2.1 / 6), 2 ** ((2.1 if dz == 0 else 1.1) / 6)
     tolerance = (expected * (1 - low), expected * (high - 1)) if expected else (0.0, 1.0)
     return [
         ResultRow(
