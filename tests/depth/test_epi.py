@@ -37,7 +37,7 @@ def noisy(views, deviation, rng):
 def test_a_plane_is_found_to_a_hundredth_with_no_range_given(paint, disparity):
     views, truth = views_of([(paint[0], flat(disparity), None)])
     # A sweep alone is off by up to 0.05: half of what a parabola cannot tell between its labels.
-    assert np.abs(epi(views).values - truth)[4:-4, 4:-4].max() < 0.016
+    assert np.abs(epi(views).values - truth)[4:-4, 4:-4].max() < 0.012
 
 
 def test_vignetting_without_a_white_image_is_not_taken_for_depth(paint):
@@ -95,9 +95,9 @@ def test_black_things_are_not_taken_for_vignetting(paint):
 def test_a_slanted_plane_is_not_a_staircase(paint):
     views, truth = views_of([(paint[0], lambda y, x: 0.02 * x + 0.01 * y, None)])
     found = np.asarray(epi(views).values)[4:-4, 4:-4]
-    assert np.abs(found - truth[4:-4, 4:-4]).max() < 0.016
+    assert np.abs(found - truth[4:-4, 4:-4]).max() < 0.012
     # Steps from lenslet to lenslet: 0.02 everywhere, where a staircase has 0 and 0.13.
-    np.testing.assert_allclose(np.diff(found, axis=1), 0.02, atol=0.009)
+    np.testing.assert_allclose(np.diff(found, axis=1), 0.02, atol=0.006)
 
 
 def test_an_edge_of_depth_stays_where_it_is(paint):
@@ -350,7 +350,7 @@ def test_beside_an_edge_of_depth_a_place_is_less_sure(bar):
     error = np.asarray(epi(views, (-1, 3)).error)[4:-4]
     beside, away = error[:, [27, 28, 43, 44]], error[:, 32:40]  # the bar's edges are at 28.5 and 43.5
     # Both have the same texture: noise and contrast alone gave both the same error.
-    assert np.median(beside) > 4 * np.median(away)
+    assert np.median(beside) > 10 * np.median(away)
 
 
 def test_what_the_middle_view_does_not_show_is_unknown(paint):

@@ -1,7 +1,7 @@
 """Depth from a light field.
 
 - `estimate`: one call for views, which `lumigraph.depth(views)` runs: the module itself can be called
-- `epi` (`pictures`, `sweep`, `lines`, `visible`, `shading`): disparities by epipolar-plane images
+- `epi` (`pictures`, `sweep`, `lines`, `visible`, `vote`, `shading`): disparities by epipolar-plane images
 - `from_focus`: refocus factors by a focal stack; `BiasCurve` and `bias.unbiased` correct for diffraction
 - `correlation`, `dense`, `of_pixels` (`sightings`, `flat`): patch sizes of a plenoptic 2.0 camera
 - `fuse`: several maps as one; `metric`: metres, virtual depths; `mesh`: surfaces; `drawn`: pictures of maps

@@ -66,8 +66,6 @@ class Evidence:
         Between the least and the greatest value that there may be, which matches by chance may have.
     period
         Error (y, x) that nothing would show, as in textures that repeat.
-    behind
-        Error (y, x) to expect of plain places, which may belong to what is farther.
     """
 
     deviation: np.ndarray
@@ -78,7 +76,6 @@ class Evidence:
     chance: np.ndarray | float = 0.0
     farthest: float = 0.0
     period: np.ndarray | float = 0.0
-    behind: np.ndarray | float = 0.0
 
 
 def deviation(
@@ -153,15 +150,14 @@ def expected(
 
     `values` (y, x) are greater where nearer. `slants`: see `terms`. Where other values explain an area as
     well, as in a texture that repeats, it is at least a part of how far they lie; where nothing else would
-    look different, at least that, and so beside what is farther; and by chance a match may be anywhere.
+    look different, at least that; and by chance a match may be anywhere.
     """
     parts = terms(values, evidence, slants=slants)
     usual = sum((factors[name] * part for name, part in parts.items()), np.zeros_like(values))
     rivals = np.where(evidence.rivals > _CHANCE, evidence.rivals, 0)
     rivals = _RIVALS * grey_opening(grey_closing(rivals, _GAPS), _AREA)
     blind = np.asarray(evidence.chance) * (evidence.farthest / 2)
-    unseen = np.maximum(evidence.period, evidence.behind)
-    return np.maximum(np.maximum(usual, rivals), np.maximum(unseen, blind))
+    return np.maximum(np.maximum(usual, rivals), np.maximum(evidence.period, blind))
 
 
 def uniform(evidence: Evidence) -> np.ndarray:

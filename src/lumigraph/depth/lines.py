@@ -1,6 +1,6 @@
 """Slopes of the lines of all epipolar-plane images at once, by least squares about a first estimate."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -14,67 +14,51 @@ from lumigraph.depth.expected import LINES, Evidence, contrast, deviation
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Shading, ShadingFit
 from lumigraph.depth.smooth import Stiffness, tears, update
-from lumigraph.depth.sweep import Swept, along
 from lumigraph.depth.visible import BEFORE, visible
 from lumigraph.depth.volume import box
+from lumigraph.depth.vote import agreed
 
 _spline: Any = spline_filter
 
-_AGREED = (1.5, 3.0)  # of the noise: what views differ by where a stiff surface fits, and where it does not
+_JUMPS = (2.0, 1.2)
+"""Second difference that counts as an edge, round by round [px in the outermost view]."""
+
+_KINK = 4e-3  # px in the outermost view
+_STIFFNESS = 4000.0  # per variance of the noise, and per `_lever`
 _EDGE = 0.003  # contrast between neighbours [of a picture from 0 to 1] where a surface may end
 _USUAL, _AROUND = 1.3, 8  # times the mean contrast within so many px, which is texture
 _LOOSEST = 0.1  # part of its stiffness that a surface keeps at the sharpest edge
 _LEAST_SAID, _WINDOW = 0.15, 3  # of what gradients seem to say; samples to each side that tell it
 _MOST_LEFT = 0.2  # of a picture from 0 to 1: more says only that a place is wrong
+_TEAR = 2.0  # px in the outermost view between neighbours that are not of one surface
 _BESIDE = 2  # px beside an occluder whose differences show its edge
 
 
-@dataclass(frozen=True, slots=True)
-class _Round:
-    """Surface of a round of least squares.
-
-    Parameters
-    ----------
-    kink
-        Second difference above which a bend costs its amount, not its square [px in the outermost view].
-    jump
-        Second difference that counts as an edge [px in the outermost view].
-    stiffness
-        Per variance of the noise, and per `_lever`.
-    tear
-        Between neighbours that are not of one surface [px in the outermost view].
-    """
-
-    kink: float
-    jump: float
-    stiffness: float
-    tear: float
-
-
-_STIFF, _SUPPLE = _Round(0.05, 2.0, 4000.0, 1.2), _Round(4e-3, 1.2, 2000.0, 1.2)
-"""The first round mends what a sweep by narrow windows gets wrong, the second follows leaves."""
-
-
 def refined(
-    pictures: Pictures, swept: Swept, shading: Shading, progress: Progress
+    pictures: Pictures, swept: tuple[Sequence[np.ndarray], np.ndarray], shading: Shading, progress: Progress
 ) -> tuple[np.ndarray, Evidence]:
     """Movements (y, x) in the outermost view [px], refined on all views, and what they rest on.
 
-    The map of a sweep is refined on some of the views first, then on all.
+    `swept` are one or two first maps of movements (y, x), and how far others lie that explain a place as
+    well. Two are both refined on some of the views; each place takes the one that the views agree with, and
+    what is so joined is refined on all.
 
     Each round computes by how much a place should move for every view that sees it, r = g Δ: the residual r
     against the middle view, and the gradient g along the view's own direction. The answers, weighted by what
     they say, are joined by a smooth surface.
     """
-    grey = pictures.data.mean(2)
+    (maps, rivals), grey = swept, pictures.data.mean(2)
     lines = _Lines(pictures, _splines(grey, pictures.lit), contrast(grey[pictures.middle]))
-    some = replace(lines, pictures=few(pictures))
-    moves, left = some.moved(swept.moves, shading, _STIFF)
+    some = replace(lines, pictures=few(pictures)) if len(maps) > 1 else lines
+    found = [some.moved(one, shading, _JUMPS[0]) for one in maps]
+    moves, left = found[0]
     progress(0.5)
+    if len(found) > 1:
+        moves = np.where(agreed(pictures, (moves, found[1][0]), left), found[1][0], moves)
     asked = _asked(pictures, lines.splines, moves, left)
-    moves = lines.changed(moves, asked, _SUPPLE)
+    moves = lines.changed(moves, asked, _JUMPS[1])
     progress(1.0)
-    return moves, replace(_evidence(lines, asked, moves, swept.rivals), behind=swept.behind)
+    return moves, _evidence(lines, asked, moves, rivals)
 
 
 def few(pictures: Pictures) -> Pictures:
@@ -82,10 +66,21 @@ def few(pictures: Pictures) -> Pictures:
     lit = np.zeros_like(pictures.lit)
     lit[pictures.middle] = True
     for way in np.ndindex(3, 3):
-        if way != (1, 1):
-            for place in along(pictures, way)[::-2]:
+        step = np.array(way) - 1
+        if step.any():
+            arm = list(_along(pictures, step))
+            for place in arm[::-2]:
                 lit[place] = True
     return replace(pictures, lit=lit)
+
+
+def _along(pictures: Pictures, step: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Lit views in steps from the middle one."""
+    v, u = np.array(pictures.middle) + step
+    while 0 <= v < pictures.lit.shape[0] and 0 <= u < pictures.lit.shape[1]:
+        if pictures.lit[v, u]:
+            yield int(v), int(u)
+        v, u = v + step[0], u + step[1]
 
 
 def _splines(grey: np.ndarray, lit: np.ndarray) -> np.ndarray:
@@ -111,24 +106,17 @@ class _Lines:
         above = np.maximum(self.contrast - _USUAL * usual, 0)
         return np.maximum(np.exp(-above / (_EDGE + usual)), _LOOSEST)
 
-    def moved(self, moves: np.ndarray, shading: Shading, surface: _Round) -> tuple[np.ndarray, Shading]:
+    def moved(self, moves: np.ndarray, shading: Shading, jump: float) -> tuple[np.ndarray, Shading]:
         """A map after a round, and the shading that is left."""
         asked = _asked(self.pictures, self.splines, moves, shading)
-        return self.changed(moves, asked, surface), asked.shading
+        return self.changed(moves, asked, jump), asked.shading
 
-    def changed(self, moves: np.ndarray, asked: "_LineDemand", surface: _Round) -> np.ndarray:
+    def changed(self, moves: np.ndarray, asked: "_LineDemand", jump: float) -> np.ndarray:
         """Map (y, x) moved by the changes that views imply."""
-        stiffness = _STIFF.stiffness * self.pictures.noise**2 * _lever(self.pictures)
-        how, torn = Stiffness(stiffness, surface.kink, surface.jump), tears(moves, surface.tear)
-        kept = self._edges * self._kept(asked, surface)
-        change = update(moves, asked.information, asked.pull, how, kept, torn) - moves
+        stiffness = _STIFFNESS * self.pictures.noise**2 * _lever(self.pictures)
+        how = Stiffness(stiffness, _KINK, jump)
+        change = update(moves, asked.information, asked.pull, how, self._edges, tears(moves, _TEAR)) - moves
         return moves + np.clip(change, -BEFORE, BEFORE)
-
-    def _kept(self, asked: "_LineDemand", surface: _Round) -> np.ndarray:
-        """Part (y, x) of the first round's stiffness: all where views agree to noise, else the round's."""
-        left = box(asked.residual, 1) / self.pictures.noise
-        part = np.clip((left - _AGREED[0]) / (_AGREED[1] - _AGREED[0]), 0, 1)
-        return (surface.stiffness / _STIFF.stiffness) ** part
 
 
 def _evidence(lines: _Lines, asked: "_LineDemand", moves: np.ndarray, rivals: np.ndarray) -> Evidence:

@@ -1,21 +1,23 @@
 """Plane sweep: agreement of the views if a place lies at each of many disparities.
 
-Only the arms of a star of views about the middle one are used. What stands before a place hides it from the
-views on one side, and a leaf before it from those on both; so the better half of the arms counts. Of a cross,
-or of a row, the better half of each line does: arms along an edge say nothing, and would be the better ones.
+Only the cross of views through the middle one is used: each is moved along one axis only. What stands before
+a place hides it from the views of one side; so the better of the left and the right half counts, and the
+better of the upper and the lower.
+
+Near views move little between labels, and may mislead, as on glass and polished steel. So the outermost
+views are also swept alone; `lines` refines both maps, and each place takes the one that the views agree with.
 """
 
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, map_coordinates, median_filter, minimum_filter
+from scipy.ndimage import gaussian_filter, map_coordinates, median_filter
 
 from lumigraph.core import memory
-from lumigraph.core.progress import Progress, silent
+from lumigraph.core.progress import Progress, silent, within
 from lumigraph.depth.pictures import Pictures
 from lumigraph.depth.shading import WINDOW, Shading, ShadingFit
-from lumigraph.depth.visible import BEFORE
 from lumigraph.depth.volume import box, cheapest, guided, rivals, semi_global
 from lumigraph.errors import GeometryError
 
@@ -24,21 +26,9 @@ _MOST_LABELS = 2000
 _MOST_DIFFERENCE = 0.017  # of a picture from 0 to 1: more says only that the label is wrong
 _FAR = 0.15  # part of a picture's width that a point may cross from the middle view to the outermost
 _COARSE = 4
-_RADIUS = 2  # px to each side whose costs are joined; 1 leaves islands on smooth ground
-_MEDIANS = 3, 7  # places across
-_BEHIND = 8  # px to each side where something farther is seen
-_LIKELY = (
-    0.8  # of the way to it, where both explain a place; fits *rosemary* and *kitchen*, much for *antinous*
-)
-_CROSS = 4  # arms, at most, that each stand for a line of their own
-_ALONG = 1e-6  # px off a diagonal between samples
 _BAND = 1 << 16  # values at a time, which stay in the processor's cache
 _SLOW = 2.0  # px of the small pictures: what varies over more may be shading
 _DISTANT = 0.5  # power of a view's distance by which it counts; of 0, 0.5, 1, 2 on *antinous* and *cotton*
-_CLEAR = (
-    0.01  # of a picture from 0 to 1: texture with more counts no more, lest plain walls count for nothing
-)
-_ENDS = 0.002, 0.998  # parts of the texture between which a sweep searches
 _MODEST = 0.05  # preference for small movements where the views do not say
 
 
@@ -54,27 +44,12 @@ def labels(low: float, high: float) -> np.ndarray:
     return (middle + _STEP * np.linspace(-half, half, count + 4)).astype(np.float32)
 
 
-@dataclass(frozen=True, slots=True)
-class Swept:
-    """First map of movements in the outermost view [px], and which others may be right.
+def swept(
+    pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Progress
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Movements (y, x) of places in the outermost view [px], to a fraction of a label, and their `rivals`.
 
-    Parameters
-    ----------
-    moves
-        (y, x), to a fraction of a label.
-    rivals
-        How far (y, x) other movements lie that explain a place as well; see `volume.rivals`.
-    behind
-        Error (y, x) to expect because a place may belong to what is seen behind; see `behind`.
-    """
-
-    moves: np.ndarray
-    rivals: np.ndarray
-    behind: np.ndarray
-
-
-def swept(pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Progress) -> Swept:
-    """The map of the least costs, smoothed along the picture's edges and by semi-global matching.
+    One map by all views of the cross, and where it has others than the outermost, one by these alone.
 
     Raises
     ------
@@ -88,188 +63,176 @@ def swept(pictures: Pictures, moves: np.ndarray, shading: Shading, progress: Pro
         "Give a range of disparities {factor:.1f}x narrower.",
     )
     most, step = max(_MOST_DIFFERENCE, 3 * pictures.noise), moves[1] - moves[0]
+    ends = outermost(pictures)
+    share = 1.0 if ends is None else 0.7
+    total = _matched(pictures, moves, most, shading, within(progress, 0, share))
+    found, others = [_cheapest(total, moves)], rivals(total, most) * step
+    del total
+    if ends is not None:
+        second = _matched(ends, moves, most, shading, within(progress, share, 1))
+        found.append(_cheapest(second, moves))
+    return found, others
+
+
+def _matched(
+    pictures: Pictures, moves: np.ndarray, most: float, shading: Shading, progress: Progress
+) -> np.ndarray:
+    """Costs (n, y, x) of the movements, smoothed along the picture's edges and by semi-global matching."""
     guide = pictures.center.mean(0)
-    cost = guided(costs(pictures, moves, most, progress, shading), guide, _RADIUS)
-    total = semi_global(cost, guide, 0.2 * most, most)
-    found = _settled(cost, moves, moves[0] + cheapest(total) * step, pictures.noise)
-    return Swept(found, rivals(total, most) * step, behind(cost, moves, found, pictures.noise))
+    cost = guided(costs(pictures, moves, most, progress, shading), guide, 3)
+    return semi_global(cost, guide, 0.2 * most, most)
 
 
-def behind(cost: np.ndarray, moves: np.ndarray, found: np.ndarray, noise: float) -> np.ndarray:
-    """Error (y, x) to expect of places that may belong to what is seen behind them [px].
-
-    A plain gap between leaves shows nothing of its own depth, and smoothing gives it that of the leaves.
-    Where the farthest movement around explains a place nearly as well as its own, it may be right.
-
-    Parameters
-    ----------
-    cost
-        Of each movement (n,) at each place (n, y, x), before those beside it count.
-    moves
-        Movements (n,).
-    found
-        Map (y, x).
-    noise
-        Of the pictures: so little of a difference between costs is chance.
-    """
-    far = minimum_filter(found, 2 * _BEHIND + 1)
-    dearer = _cost_at(cost, moves, far) - _cost_at(cost, moves, found)
-    away = np.where(found - far > BEFORE, found - far, 0)
-    return _LIKELY * away * np.exp(-np.maximum(dearer, 0) / np.float32(noise))
+def _cheapest(total: np.ndarray, moves: np.ndarray) -> np.ndarray:
+    """Movements (y, x) of the least cost, less those of single places."""
+    found = median_filter(moves[0] + cheapest(total) * (moves[1] - moves[0]), 5)
+    return np.clip(found, moves[0], moves[-1]).astype(np.float32)
 
 
-def _settled(cost: np.ndarray, moves: np.ndarray, found: np.ndarray, noise: float) -> np.ndarray:
-    """A map (y, x) less the islands of a few places that fit no better than what is around them."""
-    narrow, wide = (np.clip(median_filter(found, width), moves[0], moves[-1]) for width in _MEDIANS)
-    better = _cost_at(cost, moves, wide) - _cost_at(cost, moves, narrow) > noise
-    return np.where(better, narrow, wide).astype(np.float32)
-
-
-def _cost_at(cost: np.ndarray, moves: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """Cost (y, x) of the label next to a movement (y, x)."""
-    nearest = np.rint((found - moves[0]) / (moves[1] - moves[0])).astype(np.intp)
-    return np.take_along_axis(cost, np.clip(nearest, 0, len(moves) - 1)[None], 0)[0]
+def outermost(pictures: Pictures) -> Pictures | None:
+    """The same with only the outermost lit views of the cross's arms; None where there are no others."""
+    v, u = pictures.middle
+    lit, cross = np.zeros_like(pictures.lit), np.zeros_like(pictures.lit)
+    cross[v], cross[:, u] = pictures.lit[v], pictures.lit[:, u]
+    for row, column in (np.nonzero(cross[:, u])[0][[0, -1]], u), (v, np.nonzero(cross[v])[0][[0, -1]]):
+        lit[row, column] = True
+    lit[v, u] = True
+    return replace(pictures, lit=lit) if cross.sum() > lit.sum() else None
 
 
 def costs(
     pictures: Pictures, moves: np.ndarray, most: float, progress: Progress, shading: Shading | None = None
 ) -> np.ndarray:
-    """Disagreement (n, y, x) of the star of views for each movement, at most 2 `most`."""
-    pad = math.ceil(float(np.abs(moves).max())) + 2
-    arms = _arms(pictures, shading or Shading.none(pictures.center.shape[1:]), pad)
+    """Disagreement (n, y, x) of the cross of views for each movement, at most 2 `most`."""
+    pad = math.ceil(float(np.abs(moves).max())) + 1
+    halves = _halves(pictures, shading or Shading.none(pictures.center.shape[1:]), pad)
     colours, count, width = pictures.center.shape
-    out = np.empty((len(moves), count, width), np.float32)
+    out = np.zeros((len(moves), count, width), np.float32)
     band = max(1, _BAND // (colours * width))
+    room = np.empty((colours, band, width), np.float32), np.empty((band, width), np.float32)
     for start in range(0, count, band):
         rows = slice(start, min(start + band, count))
+        here = room[0][:, : rows.stop - start], room[1][: rows.stop - start]
         for k, move in enumerate(moves):
-            out[k, rows] = _better([_disagreement(arm, float(move), most, rows) for arm in arms])
+            for sides in halves:
+                means = [_disagreement(side, float(move), most, (rows, *here)) for side in sides]
+                out[k, rows] += np.minimum(*means) if len(means) == 2 else means[0]
             progress((start + (rows.stop - start) * (k + 1) / len(moves)) / count)
     return out
 
 
 @dataclass(frozen=True, slots=True)
 class _View:
-    """A view of an arm, and the middle view as bright as it is seen from there (c, y, x).
+    """A view of the cross, and the middle view as bright as it is seen from there (c, y, x).
 
-    `places` is where it stands along y and x; `data` goes on by `pad` px at its edges, and so does `seen`
-    (y, x), which places are not cut off.
+    `place` is where it stands along `axis` of its array; `data` goes on by `pad` px at its edges, and so do
+    its steps `slope` from each sample to the next, and `seen` (y, x), which places are not cut off.
     """
 
     data: np.ndarray
+    slope: np.ndarray
     middle: np.ndarray
-    places: tuple[float, float]
+    place: float
+    axis: int
     pad: int
     seen: np.ndarray | None
 
-    def difference(self, move: float, rows: slice, most: float) -> np.ndarray:
-        """Difference (y, x) from rows of the middle view, to `most`, if all places move by `move`; linear."""
-        corners = self._corners(move)
-        (first, _), others = corners[0], corners[1:]
-        start = self._read(self.data, first, rows)
-        image = start - self.middle[:, rows]
-        for corner, part in others:
-            image += np.float32(part) * (self._read(self.data, corner, rows) - start)
-        off = np.abs(image, out=image).mean(0) if len(image) > 1 else np.abs(image[0])
-        np.minimum(off, np.float32(most), out=off)
-        self._leave_outside(off, move, rows, most)
-        return off
+    def difference(self, move: float, rows: slice, out: np.ndarray) -> np.ndarray:
+        """Difference from rows of the middle view (c, y, x) if all places move by `move`, linearly."""
+        below = math.floor(move * self.place)
+        part = np.float32(move * self.place - below)
+        np.multiply(self._read(self.slope, below, rows), part, out=out)
+        out += self._read(self.data, below, rows)
+        out -= self.middle[:, rows]
+        return np.abs(out, out=out)
 
     def sees(self, move: float, rows: slice) -> np.ndarray | None:
         """Mask (y, x) of places of some rows that are not cut off if all move by `move`; None for all."""
         if self.seen is None:
             return None
-        corners = (self._read(self.seen[None], corner, rows)[0] for corner, _ in self._corners(move))
-        return np.logical_and.reduce(list(corners))
+        below = math.floor(move * self.place)
+        first, second = (self._read(self.seen[None], below + k, rows) for k in (0, 1))
+        return (first & second)[0]
 
-    def _corners(self, move: float) -> list[tuple[tuple[int, int], float]]:
-        """Samples (y, x) that a movement falls between, and their parts: along a diagonal two."""
-        (y, x), (down, right) = self.places, (math.floor(move * place) for place in self.places)
-        ty, tx = move * y - down, move * x - right
-        across = [(0, 0, (1 - ty) * (1 - tx)), (0, 1, (1 - ty) * tx), (1, 0, ty * (1 - tx)), (1, 1, ty * tx)]
-        if abs(ty - tx) < _ALONG:
-            across = [(0, 0, 1 - ty), (1, 1, ty)]
-        elif abs(ty + tx - 1) < _ALONG:
-            across = [(1, 0, ty), (0, 1, tx)]
-        return [((down + i, right + j), part) for i, j, part in across if part > 0]
+    def _read(self, data: np.ndarray, start: int, rows: slice) -> np.ndarray:
+        start += self.pad
+        if self.axis == 1:
+            return data[:, start + rows.start : start + rows.stop]
+        return data[:, rows, start : start + self.middle.shape[2]]
 
-    def _read(self, data: np.ndarray, start: tuple[int, int], rows: slice) -> np.ndarray:
-        y, x = rows.start + start[0] + self.pad, start[1] + self.pad
-        return data[:, y : y + rows.stop - rows.start, x : x + self.middle.shape[2]]
-
-    def _leave_outside(self, image: np.ndarray, move: float, rows: slice, most: float) -> None:
-        """Write `most` where rows (y, x) are read beyond the view's edge if all places move by `move`."""
-        down, right = (move * place for place in self.places)
-        height, width = self.middle.shape[1:]
-        image[: max(math.ceil(-down) - rows.start, 0)] = most
-        image[max(height - max(math.ceil(down), 0) - rows.start, 0) :] = most
-        image[:, : max(math.ceil(-right), 0)] = most
-        image[:, max(width - max(math.ceil(right), 0), 0) :] = most
+    def outside(self, image: np.ndarray, move: float, rows: slice) -> np.ndarray:
+        """The part of rows (y, x) that is read beyond the view's edge if all places move by `move`."""
+        far = move * self.place
+        if self.axis == 2:
+            return (
+                image[:, : math.ceil(-far)]
+                if far < 0
+                else image[:, max(image.shape[1] - math.ceil(far), 0) :]
+            )
+        last = self.middle.shape[1] - math.ceil(far)
+        return (
+            image[: max(math.ceil(-far) - rows.start, 0)] if far < 0 else image[max(last - rows.start, 0) :]
+        )
 
 
-def _better(arms: list[np.ndarray | None]) -> np.ndarray:
-    """Twice the mean (y, x) of the arms that differ least: half of a star's, one of each line's otherwise.
-
-    Arms are in the order of `WAYS`, and None where there is none.
-    """
-    there = [arm for arm in arms if arm is not None]
-    if len(there) > _CROSS:
-        kept = np.partition(np.stack(there), len(there) // 2 - 1, axis=0)[: len(there) // 2]
-        return kept.sum(0) * np.float32(2 / len(kept))
-    lines = [[arm for arm in pair if arm is not None] for pair in zip(arms, arms[::-1], strict=True)]
-    best = [np.minimum.reduce(line) for line in lines[: len(arms) // 2] if line]
-    return np.sum(best, axis=0) * np.float32(2 / len(best))
-
-
-def _arms(pictures: Pictures, shading: Shading, pad: int) -> list[list[_View]]:
-    """Views in the eight ways from the middle one, opposite ones as far from the list's ends."""
+def _halves(pictures: Pictures, shading: Shading, pad: int) -> list[list[list[_View]]]:
+    """Views on both sides of the middle, for each axis."""
+    v, u = pictures.middle
     arms = [
-        [_view(pictures, at, shading, pad) for at in along(pictures, way)]
-        for way in np.ndindex(3, 3)
-        if way != (1, 1)
+        [
+            _view(pictures, (int(k), u), (pictures.down[k], 1), shading, pad)
+            for k in np.flatnonzero(pictures.lit[:, u])
+        ],
+        [
+            _view(pictures, (v, int(k)), (pictures.right[k], 2), shading, pad)
+            for k in np.flatnonzero(pictures.lit[v])
+        ],
     ]
-    if not any(arms):
+    halves = [[[one for one in arm if side * one.place > 0] for side in (-1, 1)] for arm in arms]
+    kept = [[side for side in arm if side] for arm in halves]
+    if not any(kept):
         raise GeometryError("only the middle view is lit: there is no parallax. Decode without a stop.")
-    return arms
+    return [arm for arm in kept if arm]
 
 
-def along(pictures: Pictures, way: tuple[int, int]) -> list[tuple[int, int]]:
-    """Lit views (v, u) from the middle one on, in a way of 0, 1 or 2 along v and u: back, none, on."""
-    (v, u), (down, right) = pictures.middle, (step - 1 for step in way)
-    out = []
-    while 0 <= v + down < pictures.lit.shape[0] and 0 <= u + right < pictures.lit.shape[1]:
-        v, u = v + down, u + right
-        if pictures.lit[v, u]:
-            out.append((v, u))
-    return out
-
-
-def _view(pictures: Pictures, which: tuple[int, int], shading: Shading, pad: int) -> _View:
-    places = float(pictures.down[which[0]]), float(pictures.right[which[1]])
-    wider = [(0, 0), (pad, pad), (pad, pad)]
+def _view(
+    pictures: Pictures, which: tuple[int, int], stands: tuple[float, int], shading: Shading, pad: int
+) -> _View:
+    place, axis = float(stands[0]), stands[1]
+    wider = [(pad, pad) if k == axis else (0, 0) for k in range(3)]
     data = np.pad(pictures.data[which], wider, "edge")
     seen = None if pictures.seen is None else np.pad(pictures.seen[which], wider[1:], "edge")
-    return _View(data, pictures.center + shading.at(*places), places, pad, seen)
+    gloss = shading.at(place, 0.0) if axis == 1 else shading.at(0.0, place)
+    slope = np.diff(data, axis=axis, append=data.take([-1], axis))
+    return _View(data, slope, pictures.center + gloss, place, axis, pad, seen)
 
 
-def _disagreement(arm: list[_View], move: float, most: float, rows: slice) -> np.ndarray | None:
-    """Mean over the views of an arm of how much they differ from rows of the middle one (y, x).
+def _disagreement(
+    side: list[_View], move: float, most: float, room: tuple[slice, np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Mean over the views of one side of how much they differ from rows of the middle one (y, x).
 
     Far views count more: in near ones a wrong place moves less, and differs less. Where all of them are cut
-    off, as much as counts; None of an arm without views.
+    off, as much as counts.
     """
-    if not arm:
-        return None
-    total = np.float32(0)
+    rows, space, difference = room
+    total = np.zeros(difference.shape, np.float32)
     weights: np.ndarray | np.float32 = np.float32(0)
-    for view in arm:
-        sees, distant = view.sees(move, rows), np.float32(max(map(abs, view.places)) ** _DISTANT)
+    for view in side:
+        colours = view.difference(move, rows, space)
+        np.copyto(difference, colours[0])
+        for colour in colours[1:]:
+            difference += colour
+        difference /= len(colours)
+        np.minimum(difference, np.float32(most), out=difference)
+        view.outside(difference, move, rows)[...] = most
+        sees, distant = view.sees(move, rows), np.float32(abs(view.place) ** _DISTANT)
         weight = distant if sees is None else distant * sees
-        total = total + weight * view.difference(move, rows, most)
+        difference *= weight
+        total += difference
         weights = weights + weight
-    if np.ndim(weights) == 0:
-        return np.asarray(total / weights)
-    return np.where(weights == 0, np.float32(most), total / np.where(weights == 0, 1, weights))
+    total /= np.where(np.equal(weights, 0), 1, weights)
+    return np.where(np.equal(weights, 0), np.float32(most), total)
 
 
 def farthest(pictures: Pictures) -> float:
@@ -298,7 +261,7 @@ def span(pictures: Pictures) -> tuple[tuple[float, float], Shading]:
         best = cheapest(semi_global(cost, guide, 0.1 * limit, limit))
         found = moves[0] + best * (moves[1] - moves[0])
         shading = _shading(small, found.astype(np.float32), radius, limit)
-    low, high = _quantiles(found * size, np.minimum(texture, _CLEAR) ** 2, _ENDS)
+    low, high = _quantiles(found * size, texture**2, (0.01, 0.99))
     spare = 0.1 * (high - low) + 2 * _STEP
     return (low - spare, high + spare), _enlarged(shading, pictures.center.shape[1:])
 
