@@ -9,6 +9,9 @@ ELSEWHERE = {
     "gpu": "some GB; the tests of arrays run on another version",
     "napari": ".ci/napari runs on the versions of .ci/napari.txt",
     "optiland": ".ci/optiland runs on the versions of .ci/optiland.txt",
+    "deepinv": "needs PyTorch; the tests of operators run on other versions where it is there",
+    "scenes": "the tests of rendered scenes run on the version of .ci/run",
+    "bench": "pymmcore-plus asks for newer versions of others; its tests run on that of .ci/oracles.txt",
     "docs": "tools of the pages, pinned by docs/requirements.lock",
     "dev": "tools of the tests, pinned by requirements-dev.lock, but for those that run here",
 }
