@@ -41,7 +41,7 @@ ALIKE = 2e-3
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 TO_SCENE = np.diag([-1.0, -1.0, 1.0, 1.0])
-"""From (x to the right, y down, z away) as a camera sees to a renderer's sensor: x to the left, y up."""
+"""Turn (4, 4) of axes as a camera sees (x right, y down, z away) to a renderer's sensor (x left, y up)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +79,7 @@ class RaytracedScene:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class LensView:
     """Picture that a point of the main lens sees of the scene, at pixels of the focused plane.
 
     Parameters
@@ -269,7 +269,7 @@ class Tracer:
         places: Sequence[tuple[float, float]],
         samples: int,
         seed: int,
-    ) -> Iterator[View]:
+    ) -> Iterator[LensView]:
         """Pictures that places on the lens see, at `FINER` pixels for each sample along an axis."""
         light = self.scene.integrator()
         kind = {"type": "path", "max_depth": 8} if light is None else light
@@ -287,7 +287,7 @@ class Tracer:
             distance[~normals.any(-1)] = np.inf
             seen = normals @ axes  # x to the left, y up
             turned = np.stack([-seen[..., 1], -seen[..., 0], seen[..., 2]], -1).astype(np.float32)
-            yield View(place, picture[..., :3].astype(np.float32), distance, turned)
+            yield LensView(place, picture[..., :3].astype(np.float32), distance, turned)
 
     def _sensor(self, grid: Grid, focus: float, place: tuple[float, float], axes: np.ndarray) -> Any:
         """Pinhole at a place of the lens, whose frame is the grid in the focused plane."""
@@ -333,10 +333,10 @@ class Layers:
     grid: Grid
     camera: SeeingCamera
     inverse: np.ndarray
-    middle: View
+    middle: LensView
 
     @classmethod
-    def of(cls, middle: View, grid: Grid, camera: SeeingCamera, planes: int) -> "Layers":
+    def of(cls, middle: LensView, grid: Grid, camera: SeeingCamera, planes: int) -> "Layers":
         """No slices yet, between the nearest and the farthest thing that the middle of the lens sees."""
         there = np.isfinite(middle.distance)
         if not there.any():
@@ -358,7 +358,7 @@ class Layers:
         self._change = Change(self.middle)
         self._places: list[tuple[float, float]] = []
 
-    def numbers(self, view: View) -> np.ndarray:
+    def numbers(self, view: LensView) -> np.ndarray:
         """Slice of each pixel of a view; -1 where nothing is."""
         step = self.inverse[1] - self.inverse[0] if len(self.inverse) > 1 else 0.0
         places = 1 / view.distance
@@ -368,7 +368,7 @@ class Layers:
             found = np.clip(np.rint((places - self.inverse[0]) / step), 0, len(self.inverse) - 1).astype(int)
         return np.where(np.isfinite(view.distance), found, -1)
 
-    def add(self, view: View) -> None:
+    def add(self, view: LensView) -> None:
         """Add what a view sees to the slices."""
         self._check_open(view)
         numbers = self.numbers(view)
@@ -407,7 +407,7 @@ class Layers:
         means = _coarser(_coarser(picture, rests[0]).swapaxes(0, 1), rests[1]).swapaxes(0, 1)
         return (slice(starts[0], starts[0] + ny), slice(starts[1], starts[1] + nx)), means
 
-    def _check_open(self, view: View) -> None:
+    def _check_open(self, view: LensView) -> None:
         """Refuse light that comes from nowhere."""
         whole, nowhere = view.light.sum(), view.light[~np.isfinite(view.distance)].sum()
         if nowhere > LEFT_OPEN * whole:
@@ -484,7 +484,7 @@ class Change:
         View of the lens' middle.
     """
 
-    def __init__(self, middle: View) -> None:
+    def __init__(self, middle: LensView) -> None:
         self.middle = middle
         shape = middle.distance.shape
         self._sums = np.zeros((4, *shape))  # of light, its square, light times y and times x
@@ -492,7 +492,7 @@ class Change:
         self._asked, self._alike = np.ones(shape, np.float32), np.isfinite(middle.distance).astype(np.float32)
         self._places: list[tuple[float, float]] = []
 
-    def add(self, view: View, at: np.ndarray) -> None:
+    def add(self, view: LensView, at: np.ndarray) -> None:
         """Add a view, which would see the middle one's places at pixels `at` (2, ny, nx)."""
         light = map_coordinates(view.light @ LUMINANCE, at, order=1, mode="constant", cval=np.nan)
         distance = map_coordinates(view.distance, np.nan_to_num(at), order=0, mode="constant", cval=np.nan)

@@ -25,7 +25,7 @@ class _FirstOrder(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, *slopes: torch.Tensor) -> torch.Tensor:
-        return _Once.apply(slopes[0])  # type: ignore[return-value]
+        return _Once.apply(slopes[0])  # type: ignore[return-value]  # apply is untyped
 
     @staticmethod
     def jvp(ctx: Any, *changes: torch.Tensor) -> torch.Tensor:
@@ -162,4 +162,4 @@ def again(function: Callable[..., Any], *given: torch.Tensor) -> Any:
 
 def first_order(x: torch.Tensor) -> torch.Tensor:
     """Zeros that change as an array does, once: what is linear in them has its slopes."""
-    return _FirstOrder.apply(x)  # type: ignore[return-value]
+    return _FirstOrder.apply(x)  # type: ignore[return-value]  # apply is untyped

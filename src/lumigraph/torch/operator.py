@@ -31,12 +31,12 @@ class _Applied(torch.autograd.Function):
 
 def applied(operator: Linear, x: torch.Tensor) -> torch.Tensor:
     """Image of an object of the operator's shape, with the adjoint as derivative."""
-    return _Applied.apply(x, operator.forward, operator.adjoint)  # type: ignore[return-value]
+    return _Applied.apply(x, operator.forward, operator.adjoint)  # type: ignore[return-value]  # apply is untyped
 
 
 def returned(operator: Linear, y: torch.Tensor) -> torch.Tensor:
     """The adjoint of a raw image, with the operator as derivative."""
-    return _Applied.apply(y, operator.adjoint, operator.forward)  # type: ignore[return-value]
+    return _Applied.apply(y, operator.adjoint, operator.forward)  # type: ignore[return-value]  # apply is untyped
 
 
 class Operator(torch.nn.Module):

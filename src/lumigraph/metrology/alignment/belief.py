@@ -29,7 +29,7 @@ _FAR = (*4 * (3e-4,), *2 * (1e-4,), *2 * (0.06,), 0.02)
 """Errors of `BenchRays.measures`, over how far they are from those of the camera file."""
 
 _ASIDE = 0.15, 2e-3
-"""From an origin so far from that of the camera file on, pixels change the slope by the second [px]."""
+"""Distance [px] of an origin from the camera file's from which on pixels change the slope by the second."""
 
 _LEVER = 0.03  # m: angles drift by as much as lengths, over this
 

@@ -11,7 +11,7 @@ from lumigraph.metrology.alignment.rays import BenchRays
 from lumigraph.metrology.alignment.setup import STATE_UNITS, STATES, Motor, shown
 
 TOLERANCES = {"m": 5e-6, "rad": 3.49e-4, "1": 1e-3}
-"""What may be left, by unit: 5 µm, 0.02°, 0.1 %."""
+"""Error that may be left, by unit: 5 µm, 0.02°, 0.1 %."""
 
 SURE = 1.96
 """Standard deviations that hold 95 %."""

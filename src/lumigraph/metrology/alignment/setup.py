@@ -15,7 +15,7 @@ from lumigraph.metrology.twin import CAUSES, UNITS
 from lumigraph.units import parse
 
 STATES = (*CAUSES, "sensor", "separation", "pitch")
-"""What may be out of place: `twin.CAUSES`, then
+"""Quantities that may be out of place: `twin.CAUSES`, then
 
 - sensor: distance of the sensor from the array beyond its place [m]
 - separation: distance of the main lens from the array beyond its place [m]
@@ -25,7 +25,7 @@ STATES = (*CAUSES, "sensor", "separation", "pitch")
 STATE_UNITS = (*UNITS, "m", "m", "1")
 
 MOVABLE = STATES[:-1]
-"""What a motor may move."""
+"""Quantities that a motor may move."""
 
 _DIMENSION = {"m": "length", "rad": "angle"}
 

@@ -54,7 +54,7 @@ SLOWLY = 1.7
 """How much more is missed than that behind discs, and hexagons with gaps, whose light falls off slowly."""
 
 LEAST = 2.2e-6
-"""What is left where all light is followed: single precision, 1e-6 to 2.5e-6 of 60 drawn cameras."""
+"""Error that is left where all light is followed: single precision, 1e-6 to 2.5e-6 of 60 drawn cameras."""
 
 RIMS, SMOOTH = 6.0, 2.0
 """Error of the samples behind opaque rims over the accuracy's square, and the number p²/(λb) from which it

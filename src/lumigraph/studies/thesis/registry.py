@@ -16,7 +16,7 @@ from lumigraph.errors import FormatError, LumigraphError
 Tolerance = float | tuple[float, float]
 
 Kind = Literal["waves", "closed form", "told"]
-"""What a row proves: a computed wave or picture against theory, a formula against itself or its printed
+"""Kind of proof: a computed wave or picture against theory, a formula against itself or its printed
 value, or nothing, where a number has no theory."""
 
 
