@@ -1,14 +1,13 @@
 """Raw images of points and of planes by PyTorch, through the lines of `lumigraph.operators.lenslets`.
 
-Sampling is decided there, from plain numbers. Each point's light is computed anew on the way back, so that
-memory does not grow with their number.
+Sampling is decided there, from plain numbers. Light is computed anew on the way back, of some points at a
+time, so that memory does not grow with their number.
 """
 
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
 import torch
 
 from lumigraph.core import arrays
@@ -133,10 +132,10 @@ def _repeated(plane: PartPlane, x: torch.Tensor, expand: Expand) -> torch.Tensor
         block = CellImages.around(plane._own, spots[k : k + TOGETHER], plane._margin)
 
         def images(points: torch.Tensor, block: CellImages = block) -> torch.Tensor:
-            each = [again(lambda one=one: seen.bright(one) * seen.intensity(one)) for one in block.sources]
+            each = [seen.bright(one) * seen.intensity(one) for one in block.sources]
             return _added(block, _kernel(block, each), points, shape)
 
-        light = light + images(points)
+        light = light + again(images, points)
     (ry, rx) = cells.ring
     framed = torch.nn.functional.pad(light, (0, 0, rx, rx, ry, ry))
     return _read(whole, torch.stack([as_plane(one, cells, cells.samples) for one in framed]))
@@ -173,11 +172,12 @@ def _added(
     block: CellImages, kernel: torch.Tensor, points: torch.Tensor, shape: tuple[int, ...]
 ) -> torch.Tensor:
     """Light (k, rows, columns, samples) of points (k, rows, columns, points) through a block's images."""
-    light = points.new_zeros(shape)
-    each = kernel.flatten(0, 1).unbind(0)  # slices one by one would each fill a whole slope with zeros
-    for offset, part in zip(np.ndindex(*kernel.shape[:2]), each, strict=True):
-        y, x = block._from(offset, shape[1:])
-        light = light + points[:, y, x, block.numbers] @ part
+    light, (rows, columns) = points.new_zeros(shape), kernel.shape[:2]
+    for row in range(rows):  # all columns in one product: shifted views of the points beside each other
+        y, last = block._from((row, columns - 1), shape[1:])
+        seen = points[:, y, last.start : last.stop + columns - 1, block.numbers]
+        beside = seen.unfold(2, columns, 1)  # (k, rows, columns, n, cells to the left, the farthest first)
+        light = light + torch.einsum("kyxnj,jns->kyxs", beside, kernel[row].flip(0))
     return light
 
 
