@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+import lumigraph.studies.thesis.methods  # noqa: F401 (adds the thesis' methods, which are tested too)
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.propagation import METHODS, propagate

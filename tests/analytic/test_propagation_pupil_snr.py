@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+import lumigraph.studies.thesis.methods  # noqa: F401 (adds the thesis' methods, which are tested too)
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.errors import SamplingWarning

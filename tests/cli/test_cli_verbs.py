@@ -296,7 +296,12 @@ def test_render_takes_the_patch_from_a_camera_or_by_itself(lumigraph, bench):
     near = lumigraph(
         "render", "raw2.tiff", "--camera", "focused.toml", "--depth", "-1 mm", "-o", "n.png", "--json"
     )
-    assert json.loads(near.out)["patch_px"] == pytest.approx(load_camera("focused.toml").patch_at(-1e-3))
+    camera = load_camera("focused.toml")
+    assert json.loads(near.out)["patch_px"] == pytest.approx(camera.patch_at(-1e-3))
+    words = ("render", "raw2.tiff", "--camera", "focused.toml", "--detail", "0.4 mm", "-o", "d.png", "--json")
+    assert json.loads(lumigraph(*words).out)["patch_px"] == pytest.approx(camera.patch_at(0.0, 2500.0))
+    refused = lumigraph(*words[:-3], "--patch", "5", "-o", "d.png")
+    assert "--detail changes the patch" in refused.err
 
 
 def test_demo_is_run_in_the_folder(lumigraph, monkeypatch):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
+import lumigraph.studies.thesis.methods
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

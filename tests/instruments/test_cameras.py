@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from lumigraph.core.field import Field
 from lumigraph.elements import LensletArray
+from lumigraph.errors import GeometryError
 from lumigraph.instruments import (
     FocusedPlenopticCamera,
     Lenslets,
@@ -18,6 +19,7 @@ from lumigraph.instruments import (
     SingleLensCamera,
     load_camera,
 )
+from lumigraph.studies.thesis.figures.periodic import LinedCamera
 from lumigraph.units import mm, nm, um
 
 
@@ -108,6 +110,34 @@ def test_patches_follow_the_magnification_of_each_depth(m, dz):
 def test_the_patch_of_the_focused_plane():
     # The thesis' P m would be 45 px.
     assert focused().patch == focused().patch_at(0.0) == pytest.approx(39.82, abs=0.01)
+
+
+def test_tiles_of_a_grating_meet_at_the_patch_by_waves():
+    """By waves forward from lines of points; at 0.1 periods a lenslet rays have 1, one lenslet alone 1.106."""
+    camera, dz = focused(0.5).replace(lenslets={"shape": "round"}), 10e-3
+    lined = LinedCamera.of(camera, dz)
+    n, reach = lined.samples, lined.spreads.shape[-1] // lined.samples
+    rows = round(lined.patch / 2)
+    spreads = lined.spreads[:, n // 2 - rows : n // 2 + rows + 1].sum(1).reshape(lined.classes, reach, n)
+    places = (np.arange(lined.classes) - lined.classes // 2) / lined.classes
+    x = places[:, None] - (np.arange(reach) - reach // 2)
+    for turns, about in ((0.1, 1.165), (0.4, 1.053)):
+        seen = np.einsum("kjs,kj->s", spreads, np.exp(2j * np.pi * turns * x))
+        phases = np.abs(np.unwrap(np.angle(seen[n // 2 :])))
+        expected = 2 * np.interp(np.pi * turns, phases[:15], np.arange(15)) / lined.patch
+        frequency = turns / (camera.lenslets.pitch * camera.defocused(dz) / camera.separation)
+        found = camera.patch_at(dz, frequency) / camera.patch_at(dz)
+        assert found == pytest.approx(expected, abs=4e-3)
+        assert found == pytest.approx(about, abs=5e-3)
+
+
+def test_a_patch_by_waves_refuses_what_it_cannot_know():
+    with pytest.raises(GeometryError, match=r"frequency is 2e\+05 /m but the camera does not resolve that"):
+        focused().patch_at(0.0, 2e5)
+    with pytest.raises(GeometryError, match="needs an ideal main lens"):
+        focused().replace(main_lens={"aberrations": {4: 0.1}}).patch_at(0.0, 1e3)
+    with pytest.raises(GeometryError, match="frequency is -1 /m"):
+        focused().patch_at(0.0, -1.0)
 
 
 @pytest.mark.parametrize(("count", "nearest"), [((7, 7), 0.0), ((6, 6), 75e-6)])

@@ -2,16 +2,19 @@
 
 import math
 import re
+import subprocess
+import sys
 import warnings
 
 import numpy as np
 import pytest
 
+import lumigraph.studies.thesis.methods  # noqa: F401 (adds the thesis' methods, which are tested too)
 from lumigraph.core import memory
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, SamplingError, SamplingWarning
-from lumigraph.propagation import METHODS, Propagate, choose_method, propagate
+from lumigraph.propagation import METHODS, Propagate, choose_method, propagate, register
 
 WAVELENGTH = 633e-9
 
@@ -249,3 +252,25 @@ def test_random_phases_are_points():
     grid = Grid.square(200, 2e-6)
     phases = np.exp(2j * np.pi * np.random.default_rng(0).random(grid.shape))
     propagate(Field(phases, grid, WAVELENGTH), 1e-5, grid=grid)
+
+
+def test_the_thesis_own_methods_wait_for_its_package():
+    """A fresh interpreter has none of them, and says which import adds them; importing twice is no matter."""
+    lines = (
+        "import importlib, lumigraph as lg",
+        "field = lg.Field(lg.Grid.square(2, 1e-3).y[:, None] * [1.0, 0.0], lg.Grid.square(2, 1e-3), 5e-7)",
+        "try: lg.propagate(field, 1e-6, 'corrected_band_limited')",
+        "except lg.SamplingError as error: print(error)",
+        "import lumigraph.studies.thesis as thesis",
+        "importlib.reload(thesis.methods)",
+        "lg.propagate(field, 1e-6, 'corrected_band_limited')",
+    )
+    run = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, check=True)
+    assert "is one of the thesis" in run.stdout
+    assert "Import lumigraph.studies.thesis first" in run.stdout
+
+
+@pytest.mark.parametrize("name", ["auto", "band_limited"])
+def test_no_method_takes_the_name_of_another(name):
+    with pytest.raises(SamplingError, match=f"already a propagation method '{name}'"):
+        register(name, lambda field, distance, pad, grid: field)

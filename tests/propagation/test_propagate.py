@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import lumigraph.studies.thesis.methods  # noqa: F401 (adds the thesis' methods, which are tested too)
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid

@@ -14,6 +14,7 @@ from lumigraph.propagation.halves import Halves, both
 from lumigraph.propagation.pruned import Band, Transfer, convolve, nonzero_rows
 from lumigraph.propagation.window import smooth_size, window_shape
 from lumigraph.propagation.zoom import Samples, _chirp_z, _fourier_matrix
+from lumigraph.studies.thesis.methods import corrected_cutoff
 
 pytestmark = pytest.mark.filterwarnings(  # noise fills its window, and all of its frequencies
     "ignore:.* of the light left the window:lumigraph.errors.SamplingWarning",
@@ -141,7 +142,7 @@ def test_the_band_limit_is_where_the_phase_turns_by_half_a_turn_per_sample():
     step = 1 / grid.size[1]
     turns = z / wavelength * np.sqrt(1 - (wavelength * (limit + step * np.array([-0.5, 0.5]))) ** 2)
     assert abs(turns[1] - turns[0]) == pytest.approx(0.5, rel=1e-5)
-    assert sampling.corrected_cutoff(grid, z, wavelength)[1] == pytest.approx(2 * limit, rel=1e-4)
+    assert corrected_cutoff(grid, z, wavelength)[1] == pytest.approx(2 * limit, rel=1e-4)
 
 
 def test_the_fresnel_phase_error_is_the_next_term_of_the_distance():

@@ -47,8 +47,8 @@ class WithPupil(Protocol):
 class Rendered(Protocol):
     """Instruments whose raw images are rendered from a patch of each micro-image."""
 
-    def patch_at(self, dz: float) -> float:
-        """Patch [px] that tiles the picture of an object at a depth `dz` [m] from the focused plane."""
+    def patch_at(self, dz: float, frequency: float | None = None) -> float:
+        """Patch [px] that tiles the picture at a depth `dz` [m], by rays or of a frequency [1/m]."""
         ...
 
     def patches_on_raw(self) -> tuple[float, ...]:

@@ -1,15 +1,15 @@
-"""Angular spectrum of plane waves: plain, band-limited, and the thesis' circular and corrected variants.
+"""Angular spectrum of plane waves, plain and band-limited.
 
 The transfer function exp(ikz sqrt(1 - (λfx)² - (λfy)²)) is exact; on a sampled window it aliases above
-`sampling.band_limits`. The four methods differ only in what they do about that.
+`sampling.band_limits`. Methods differ only in their `PassBand`, the frequencies that they keep.
 
 J. W. Goodman, *Introduction to Fourier Optics*, section 3.10; K. Matsushima and T. Shimobaba,
-Opt. Express 17, 19662 (2009); the thesis' sections 2.4 to 2.4.3 with two corrections: the circle
-multiplies the transfer function, not its phase, and rect(f/f_max) of 2.65 is rect(f/(2 f_max)).
+Opt. Express 17, 19662 (2009); the thesis' section 2.4, where rect(f/f_max) of 2.65 is rect(f/(2 f_max)).
 """
 
 import math
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,27 +25,55 @@ from lumigraph.propagation.window import check_memory, reach, samples_between, w
 
 Pair = tuple[float, float]
 Distance = float | Array
-CIRCULAR = ("band_limited_circular", "corrected_band_limited")
+Limits = Callable[[Grid, Grid, float, float], Pair]
+
+
+@dataclass(frozen=True, slots=True)
+class PassBand:
+    """Frequencies that a method keeps of the transfer function.
+
+    Parameters
+    ----------
+    method
+        Name of the method, for messages.
+    limits
+        Highest frequencies (y, x) [1/m], a function of the input's grid, the window of the calculation, the
+        distance [m] and the wavelength [m].
+    circular
+        Keep an ellipse with these half axes, not the rectangle.
+    """
+
+    method: str
+    limits: Limits
+    circular: bool = False
+
+
+PLAIN = PassBand("angular_spectrum", lambda grid, window, distance, wavelength: (math.inf, math.inf))
+RECTANGLE = PassBand(
+    "band_limited",
+    lambda grid, window, distance, wavelength: sampling.band_limits(window, distance, wavelength),
+)
 
 
 def angular_spectrum(field: Field, distance: Distance, pad: float, grid: Grid | None) -> Field:
-    """Plain: every frequency of the window, aliased or not."""
-    return _propagate(field, distance, "angular_spectrum", pad, grid or field.grid)
+    """Field by every frequency of the window, aliased or not."""
+    return spectral(field, distance, PLAIN, pad, grid)
 
 
 def band_limited(field: Field, distance: Distance, pad: float, grid: Grid | None) -> Field:
-    """Zero outside the rectangle of `sampling.band_limits` (Matsushima and Shimobaba 2009)."""
-    return _propagate(field, distance, "band_limited", pad, grid or field.grid)
+    """Field by the rectangle of frequencies of `sampling.band_limits` (Matsushima and Shimobaba 2009)."""
+    return spectral(field, distance, RECTANGLE, pad, grid)
 
 
-def band_limited_circular(field: Field, distance: Distance, pad: float, grid: Grid | None) -> Field:
-    """Zero outside the circle of radius f_max (the thesis' 2.4.2); an ellipse on unequal windows."""
-    return _propagate(field, distance, "band_limited_circular", pad, grid or field.grid)
-
-
-def corrected_band_limited(field: Field, distance: Distance, pad: float, grid: Grid | None) -> Field:
-    """Zero outside the circle of radius max(f_max, W/(λz)) (the thesis' 2.4.3); W is the input's width."""
-    return _propagate(field, distance, "corrected_band_limited", pad, grid or field.grid)
+def spectral(field: Field, distance: Distance, band: PassBand, pad: float, grid: Grid | None) -> Field:
+    """Field after the distance [m] by the frequencies of a pass band, on `grid` or the field's own."""
+    output = grid or field.grid
+    transfer, clean = _transfer(field, distance, band, pad, output)
+    found = replace(field, data=convolve(field.data, transfer, output.shape), grid=output)
+    if clean is not None:
+        fields = field, output, found.intensity
+        sampling.warn(dropped_light(band.method, *clean, fields, arrays.number(distance)))
+    return found
 
 
 def transfer_function(fy: np.ndarray, fx: np.ndarray, distance: float, wavelength: float) -> np.ndarray:
@@ -87,48 +115,31 @@ def wave_numbers(fy: np.ndarray, fx: np.ndarray, wavelength: float) -> np.ndarra
     return 2 * math.pi / wavelength * root
 
 
-def kept_frequencies(method: str, grid: Grid, window: Grid, distance: float, wavelength: float) -> Pair:
-    """Highest frequencies (y, x) that a method keeps [1/m]; infinite for the plain one."""
-    if method == "angular_spectrum":
-        return math.inf, math.inf
-    free = sampling.band_limits(window, distance, wavelength)
-    if method != "corrected_band_limited":
-        return free
-    cutoff = sampling.corrected_cutoff(grid, distance, wavelength)
-    return max(free[0], cutoff[0]), max(free[1], cutoff[1])
-
-
 def band_limited_intensity(field: Field, distance: Distance, pad: float, grid: Grid | None) -> Array:
     """Intensity (..., y, x) of `band_limited`, without the field itself: a fifth quicker."""
     output = grid or field.grid
-    transfer, band = _transfer(field, distance, "band_limited", pad, output)
+    transfer, clean = _transfer(field, distance, RECTANGLE, pad, output)
     intensity = convolved_intensity(field.data, transfer, output.shape)
-    _check_dropped("band_limited", band, (field, output, intensity), distance)
+    if clean is not None:
+        fields = field, output, intensity
+        sampling.warn(dropped_light(RECTANGLE.method, *clean, fields, arrays.number(distance)))
     return intensity
 
 
-def _propagate(field: Field, way: Distance, method: str, pad: float, output: Grid) -> Field:
-    transfer, band = _transfer(field, way, method, pad, output)
-    found = replace(field, data=convolve(field.data, transfer, output.shape), grid=output)
-    if method.startswith("band_limited"):
-        _check_dropped(method, band, (field, output, found.intensity), way)
-    return found
-
-
 def _transfer(
-    field: Field, way: Distance, method: str, pad: float, output: Grid
+    field: Field, way: Distance, band: PassBand, pad: float, output: Grid
 ) -> tuple[Transfer, tuple[Grid, Pair] | None]:
-    """The transfer function to `output`, and its window and highest frequencies where those alias nowhere."""
+    """Transfer function to `output`, and its window and highest frequencies where it has a clean limit."""
     distance = arrays.number(way)
     step, between = samples_between(output, field.grid)
     first = between.samples_to(field.grid)
     window = Grid(window_shape(field.grid, between, pad, first, step), field.grid.pitch)
-    limits = kept_frequencies(method, field.grid, window, distance, field.wavelength)
+    limits = band.limits(field.grid, window, distance, field.wavelength)
     rows, columns = Band.below(window.fy, limits[0]), Band.below(window.fx, limits[1])
     _check_memory(field, rows, columns, output)
     farthest = tuple(map(reach, field.grid.shape, first, between.shape))
-    aliases = _check_sampling(method, field, window, limits, (distance, (farthest[0], farthest[1])))
-    circle = limits if method in CIRCULAR else None
+    aliases = _check_sampling(band.method, field, window, limits, (distance, (farthest[0], farthest[1])))
+    circle = limits if band.circular else None
     key = ("spectral", window, first, step, distance, field.wavelength, rows, columns, circle)
     values = CACHE.get(
         (*key, arrays.placement(field.data)),
@@ -142,7 +153,10 @@ def _transfer(
         across, up = rows.take(window.fy), columns.take(window.fx)  # values are (columns, rows)
         waves = wave_numbers(up, across, field.wavelength)
         values = arrays.turned(values, waves, arrays.parameter(way) - distance)
-    return Transfer(values, rows, columns, step), None if aliases else (window, limits)
+    return Transfer(values, rows, columns, step), None if aliases or math.isinf(limits[0]) else (
+        window,
+        limits,
+    )
 
 
 def _on_band(
@@ -187,18 +201,10 @@ def _check_sampling(
     method: str, field: Field, window: Grid, limits: Pair, target: tuple[float, tuple[int, int]]
 ) -> bool:
     distance, wavelength = target[0], field.wavelength
-    message = None
-    if method == "angular_spectrum":
+    if math.isinf(limits[0]):
         message = sampling.unlimited_aliases(method, window, distance, wavelength)
-    elif method == "corrected_band_limited":
+    else:
         message = sampling.kept_alias(method, limits, window, distance, wavelength)
     message = message or sampling.light_wraps(window, limits, target[1], distance, wavelength)
     sampling.warn(message)
     return message is not None
-
-
-def _check_dropped(
-    method: str, band: tuple[Grid, Pair] | None, fields: tuple[Field, Grid, Array], distance: Distance
-) -> None:
-    if band is not None:
-        sampling.warn(dropped_light(method, *band, fields, arrays.number(distance)))

@@ -1,4 +1,4 @@
-"""Fresnel diffraction: one step onto its own or a given grid, and many steps that keep the pitch.
+"""Fresnel diffraction in one step, onto its own or a given grid.
 
 One step is the paraxial integral
 
@@ -23,10 +23,7 @@ from lumigraph.errors import SamplingError
 from lumigraph.propagation import sampling
 from lumigraph.propagation.cache import CACHE
 from lumigraph.propagation.halves import Halves, both
-from lumigraph.propagation.window import check_memory, reach, window_shape
-
-MOST_STEPS = 10_000
-"""Multi-step Fresnel refuses more steps than this."""
+from lumigraph.propagation.window import check_memory
 
 
 def fresnel(field: Field, distance: float | Array, pad: float, grid: Grid | None) -> Field:
@@ -53,86 +50,12 @@ def one_step_grid(grid: Grid, distance: float, wavelength: float) -> Grid:
     return Grid(grid.shape, (pitch[0], pitch[1]), grid.center)
 
 
-def multi_step_fresnel(field: Field, distance: float, pad: float, grid: Grid | None) -> Field:
-    r"""Steps of dz = W²/(Nλ), each of which keeps the pitch (the thesis' 2.3.1), the rest by its spectrum.
-
-    Each step is one FFT between two chirps exp(iπj²/N). The distance need not be a multiple of dz: what
-    is left, less than one step, is multiplied by exp(-iπλzf²), which such a short way samples without
-    aliasing. The axes are independent, so that a window may be oblong. The window has an even number of
-    samples, because only then a chirp of N samples is periodic; on it the result equals the unpadded
-    paraxial angular spectrum to rounding.
-    """
-    output = grid or field.grid
-    first = output.samples_to(field.grid)
-    window = Grid(window_shape(field.grid, output, pad, first, (2, 2)), field.grid.pitch)
-    _check_steps(field, window, distance, (first, output))
-    steps = sampling.fresnel_step(window, field.wavelength)
-    data = _conjugate_if(distance < 0, field.data)
-    for axis, n, step, offset, n_out in zip((-2, -1), window.shape, steps, first, output.shape, strict=True):
-        data = _steps_along(data, axis, n, abs(distance) / step)
-        data = arrays.namespace(data).roll(data, -offset, axis=axis)
-        data = data[..., :n_out, :] if axis == -2 else data[..., :n_out]
-    data = data * _carrier(abs(distance), field.wavelength)
-    return replace(field, data=_conjugate_if(distance < 0, data), grid=output)
-
-
-def _check_steps(field: Field, window: Grid, distance: float, target: tuple[tuple[int, int], Grid]) -> None:
-    shortest = min(sampling.fresnel_step(window, field.wavelength))
-    if abs(distance) > MOST_STEPS * shortest:
-        raise SamplingError(
-            f"multi_step_fresnel over {abs(distance):.4g} m takes {abs(distance) / shortest:.0f} steps of "
-            f"{shortest:.4g} m, more than {MOST_STEPS}. Use method='band_limited', or a coarser pitch."
-        )
-    item = 8 if arrays.is_single(field.data) else 16
-    samples = math.prod(field.data.shape[:-2]) * math.prod(window.shape)
-    check_memory(3 * item * samples, f"multi_step_fresnel on {window.shape[0]} x {window.shape[1]} samples")
-    farthest = tuple(map(reach, field.grid.shape, target[0], target[1].shape))
-    wave = (distance, field.wavelength)
-    sampling.warn(
-        sampling.unlimited_aliases("multi_step_fresnel", window, *wave)
-        or sampling.light_wraps(window, (math.inf, math.inf), (farthest[0], farthest[1]), *wave)
-    )
-
-
-def _steps_along(data: Array, axis: int, n: int, steps: float) -> Array:
-    """Carry data over `steps` times dz along one axis, on a periodic window of `n` samples (even)."""
-    whole = math.floor(steps + 1e-9)
-    rest = max(steps - whole, 0.0)
-    j = np.arange(n)
-    chirp = np.exp(1j * math.pi * (j * j % (2 * n)) / n)
-    factor = np.exp(-0.25j * math.pi) / math.sqrt(n)
-    data = _padded(data, axis, n)
-    for index in range(whole):
-        data = data * _vector(chirp if index == 0 else factor * chirp * chirp, data, axis)
-        data = arrays.fft(data, axis=axis, overwrite=True)
-    if whole:
-        data = data * _vector(factor * chirp, data, axis)
-    if rest > 0:  # λ dz f² = N p² (k/(N p))² = k²/N
-        frequency = np.fft.fftfreq(n, 1 / n)
-        transfer = np.exp(-1j * math.pi * (rest * frequency**2 / n % 2))
-        data = arrays.fft(data, axis=axis) * _vector(transfer, data, axis)
-        data = arrays.ifft(data, axis=axis, overwrite=True)
-    return data
-
-
-def _padded(data: Array, axis: int, n: int) -> Array:
-    """Zeros behind the samples of one axis, up to `n` of them."""
-    missing = n - data.shape[axis]
-    if missing == 0:
-        return data
-    xp = arrays.namespace(data)
-    one = data[..., :1, :] if axis == -2 else data[..., :1]
-    shape = list(data.shape)
-    shape[axis] = missing
-    return xp.concat([data, xp.broadcast_to(xp.zeros_like(one), tuple(shape))], axis=axis)
-
-
 def _onto_own_grid(field: Field, distance: float, output: Grid) -> Field:
     sampling.warn(sampling.one_step_aliases(field.grid, distance, field.wavelength))
     item = 8 if arrays.is_single(field.data) else 16
     check_memory(3 * item * math.prod(field.data.shape), f"fresnel on {field.grid.shape} samples")
     area = abs(distance) * field.wavelength
-    data = _conjugate_if(distance < 0, field.data)
+    data = conjugate_if(distance < 0, field.data)
     for axis in (-2, -1):
         n, p = field.grid.shape[axis], field.grid.pitch[axis]
         j = np.arange(n) - n // 2
@@ -141,10 +64,10 @@ def _onto_own_grid(field: Field, distance: float, output: Grid) -> Field:
         # exp(-i2π jk/N) about sample n//2 of both sides
         turn = np.exp(2j * math.pi * ((n // 2) * np.arange(n) % n) / n)
         centre = np.exp(2j * math.pi * ((n // 2) * j % n) / n)
-        data = arrays.fft(data * _vector(before * turn, data, axis), axis=axis, overwrite=True)
-        data = data * _vector(after * centre, data, axis)
-    data = data * _carrier(abs(distance), field.wavelength)
-    return replace(field, data=_conjugate_if(distance < 0, data), grid=output)
+        data = arrays.fft(data * along(before * turn, data, axis), axis=axis, overwrite=True)
+        data = data * along(after * centre, data, axis)
+    data = data * carrier(abs(distance), field.wavelength)
+    return replace(field, data=conjugate_if(distance < 0, data), grid=output)
 
 
 def _onto_grid(field: Field, distance: float, output: Grid) -> Field:
@@ -153,9 +76,9 @@ def _onto_grid(field: Field, distance: float, output: Grid) -> Field:
     axes = ((output.y, field.grid.y), (output.x, field.grid.x))
     kernel, product = (_halves, both) if arrays.is_numpy(field.data) else (_matrix, _product)
     rows, columns = (kernel(field, pair, p, area) for pair, p in zip(axes, field.grid.pitch, strict=True))
-    data = product(rows, _conjugate_if(distance < 0, field.data), columns)
-    data = data * _carrier(abs(distance), field.wavelength)
-    return replace(field, data=_conjugate_if(distance < 0, data), grid=output)
+    data = product(rows, conjugate_if(distance < 0, field.data), columns)
+    data = data * carrier(abs(distance), field.wavelength)
+    return replace(field, data=conjugate_if(distance < 0, data), grid=output)
 
 
 def _differentiable(field: Field, distance: Array, output: Grid) -> Field:
@@ -176,8 +99,8 @@ def _differentiable(field: Field, distance: Array, output: Grid) -> Field:
         )
         matrices.append(bent * xp.astype(xp.sqrt(here / way), xp.real(data).dtype))
     data = _product(matrices[0], data, matrices[1])
-    carrier = _carrier(abs(here), field.wavelength)
-    data = data * (carrier if here > 0 else carrier.conjugate())
+    turn = carrier(abs(here), field.wavelength)
+    data = data * (turn if here > 0 else turn.conjugate())
     whole = np.array(2 * math.pi / field.wavelength)
     return replace(field, data=arrays.turned(data, whole, way - here), grid=output)
 
@@ -231,16 +154,17 @@ def _check_points(field: Field, distance: float, output: Grid) -> None:
             return
 
 
-def _carrier(distance: float, wavelength: float) -> complex:
-    """exp(ikz), reduced to one turn before the exponential."""
+def carrier(distance: float, wavelength: float) -> complex:
+    """Factor exp(ikz) of a distance [m], reduced to one turn before the exponential."""
     angle = 2 * math.pi * math.fmod(distance / wavelength, 1.0)
     return complex(math.cos(angle), math.sin(angle))
 
 
-def _vector(values: np.ndarray, data: Array, axis: int) -> Array:
-    """A 1-D factor of one axis, as data's kind of array."""
+def along(values: np.ndarray, data: Array, axis: int) -> Array:
+    """Factor (n,) of one axis, -2 or -1, as data's kind of array and ready to multiply it."""
     return arrays.like(values[:, None] if axis == -2 else values, data)
 
 
-def _conjugate_if(condition: bool, data: Array) -> Array:
+def conjugate_if(condition: bool, data: Array) -> Array:
+    """Complex conjugate of the data where the condition holds, else the data."""
     return arrays.namespace(data).conj(data) if condition else data

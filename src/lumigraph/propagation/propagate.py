@@ -12,35 +12,27 @@ from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.errors import GeometryError, ParaxialWarning, SamplingError
 from lumigraph.propagation import plausible, sampling
-from lumigraph.propagation.angular_spectrum import (
-    angular_spectrum,
-    band_limited,
-    band_limited_circular,
-    band_limited_intensity,
-    corrected_band_limited,
-)
+from lumigraph.propagation.angular_spectrum import angular_spectrum, band_limited, band_limited_intensity
 from lumigraph.propagation.dropped import FEWEST_FREQUENCIES
-from lumigraph.propagation.fresnel import fresnel, multi_step_fresnel
+from lumigraph.propagation.fresnel import fresnel
 from lumigraph.propagation.window import samples_between
 from lumigraph.propagation.zoom import zoom
 
 Method = Callable[[Field, Any, float, Grid | None], Field]
 
-METHODS: Mapping[str, Method] = MappingProxyType(
-    {
-        "fresnel": fresnel,
-        "multi_step_fresnel": multi_step_fresnel,
-        "angular_spectrum": angular_spectrum,
-        "band_limited": band_limited,
-        "band_limited_circular": band_limited_circular,
-        "corrected_band_limited": corrected_band_limited,
-        "zoom": zoom,
-    }
-)
-"""Every method by name; `"auto"` stands for the one that `choose_method` picks."""
+_METHODS: dict[str, Method] = {
+    "fresnel": fresnel,
+    "angular_spectrum": angular_spectrum,
+    "band_limited": band_limited,
+    "zoom": zoom,
+}
+_PARAXIAL = {"fresnel"}
+_DIFFERENTIABLE = {"angular_spectrum", "band_limited"}
 
-DIFFERENTIABLE = ("angular_spectrum", "band_limited", "band_limited_circular", "corrected_band_limited")
-"""Methods through whose distance derivatives go."""
+METHODS: Mapping[str, Method] = MappingProxyType(_METHODS)
+"""Every method by name; `"auto"` stands for the one that `choose_method` picks. See `register`."""
+
+_OF_THE_THESIS = ("multi_step_fresnel", "band_limited_circular", "corrected_band_limited")
 
 SHORTEST = 1e-100
 """Distances nearer to zero count as zero [m]."""
@@ -100,6 +92,34 @@ class Propagate:
         return intensity
 
 
+def register(name: str, method: Method, *, paraxial: bool = False, differentiable: bool = False) -> None:
+    """Add a method to `METHODS`.
+
+    Parameters
+    ----------
+    name
+        As `propagate` takes it.
+    method
+        Takes a field, a distance [m], a padding and an output grid or None, and returns the field there.
+    paraxial
+        It makes the Fresnel approximation: `propagate` warns where that is too coarse.
+    differentiable
+        It takes a distance that is a 0-d array of an automatic-differentiation library.
+
+    Raises
+    ------
+    SamplingError
+        A method of another module has that name.
+    """
+    known = _METHODS.get(name)
+    if name == "auto" or (known is not None and known.__module__ != method.__module__):
+        raise SamplingError(f"there is already a propagation method {name!r}. Choose another name.")
+    _METHODS[name] = method
+    for group, belongs in ((_PARAXIAL, paraxial), (_DIFFERENTIABLE, differentiable)):
+        if belongs:
+            group.add(name)
+
+
 def propagate(
     field: Field,
     distance: float | Array,
@@ -128,8 +148,8 @@ def propagate(
         for it, "auto" chooses it.
     grid
         Output grid; the input's own if left out. Methods that keep the pitch take any window whose
-        samples fall on the input's, smaller, larger or shifted, and compute only that window. All of them but
-        "multi_step_fresnel" also take every second, third … of those samples, and compute little more.
+        samples fall on the input's, smaller, larger or shifted, or every second, third … of those samples,
+        and compute little more than these.
 
     Returns
     -------
@@ -194,7 +214,7 @@ def propagate(
 def _check(method: str, field: Field, distance: float, onto: tuple[Grid | None, Field]) -> None:
     """Warn of what speaks against a result, on the grid that was asked for."""
     given, found = onto
-    if method in ("fresnel", "multi_step_fresnel"):
+    if method in _PARAXIAL:
         reached = given if method == "fresnel" else found.grid
         sampling.warn(plausible.beyond_paraxial(method, field, distance, reached), ParaxialWarning)
     if method == "fresnel":
@@ -206,11 +226,10 @@ def _check(method: str, field: Field, distance: float, onto: tuple[Grid | None, 
 
 def _differentiable(field: Field, distance: Array, method: str, pad: float, grid: Grid | None) -> Field:
     """Through a distance that is a 0-d array, where the method can."""
-    known = (*DIFFERENTIABLE, *(("fresnel",) if grid is not None else ()))
-    if method not in known:
+    if method not in _DIFFERENTIABLE and (method != "fresnel" or grid is None):
         raise SamplingError(
             f"method {method!r} cannot be differentiated by its distance. Use one of "
-            f"{', '.join(DIFFERENTIABLE)}, or 'fresnel' onto a grid."
+            f"{', '.join(sorted(_DIFFERENTIABLE))}, or 'fresnel' onto a grid."
         )
     if arrays.number(distance) == 0:
         raise SamplingError("a distance of 0 m cannot be differentiated. Give one above 0, or a plain 0.")
@@ -334,8 +353,14 @@ def _window_along(data: Array, axis: int, first: int, count: int) -> Array:
 
 
 def _check_method(method: str) -> None:
-    if not isinstance(method, str) or method not in ("auto", *METHODS):
-        raise SamplingError(f"method is {method!r} but must be 'auto' or one of {', '.join(METHODS)}.")
+    if isinstance(method, str) and method in ("auto", *METHODS):
+        return
+    if method in _OF_THE_THESIS:
+        raise SamplingError(
+            f"method {method!r} is one of the thesis, kept for comparison. Import lumigraph.studies.thesis "
+            'first, which adds it, or use method="band_limited".'
+        )
+    raise SamplingError(f"method is {method!r} but must be 'auto' or one of {', '.join(METHODS)}.")
 
 
 def _check_pad(pad: float) -> None:

@@ -98,26 +98,6 @@ def band_limits(window: Grid, distance: float, wavelength: float) -> Pair:
     return limits[0], limits[1]
 
 
-def corrected_cutoff(grid: Grid, distance: float, wavelength: float) -> Pair:
-    r"""The thesis' cut-off frequencies (y, x) of free space between two windows of one width [1/m].
-
-    .. math:: \nu_{cutoff} = W / (\lambda z)
-
-    the thesis' equation 2.68. Without padding it is twice the paraxial `band_limits`.
-
-    Parameters
-    ----------
-    grid
-        Input grid, of width W.
-    distance
-        z [m], of either sign but not zero.
-    wavelength
-        In vacuum [m].
-    """
-    cutoff = [size / (wavelength * abs(distance)) for size in grid.size]
-    return cutoff[0], cutoff[1]
-
-
 def smallest_window(input_diameter: float, output_diameter: float) -> float:
     """Width of a window that keeps wrapped light off the output: 2 (r_in + r_out) [m].
 
@@ -248,7 +228,15 @@ def light_wraps(
 def warn(message: str | None, category: type[UserWarning] = SamplingWarning) -> None:
     """Issue a warning in the name of whoever called this package, if there is anything to say."""
     if message:
-        level, frame = 2, sys._getframe(1)
-        while frame.f_back and str(frame.f_globals.get("__name__")).startswith("lumigraph.propagation"):
-            level, frame = level + 1, frame.f_back
-        warnings.warn(message, category, stacklevel=level)
+        warnings.warn(message, category, stacklevel=_callers_level())
+
+
+def _callers_level() -> int:
+    """Level, for `warn`, of whoever called the package; methods registered from elsewhere lie between."""
+    level, found, frame = 1, 2, sys._getframe(1)
+    while frame is not None:
+        level += 1
+        if str(frame.f_globals.get("__name__")).startswith("lumigraph.propagation"):
+            found = level
+        frame = frame.f_back
+    return found

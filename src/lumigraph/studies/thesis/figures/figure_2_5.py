@@ -6,6 +6,7 @@ from lumigraph.core.grid import Grid
 from lumigraph.plots import curves, images
 from lumigraph.propagation import sampling
 from lumigraph.propagation.angular_spectrum import transfer_function
+from lumigraph.studies.thesis.methods import corrected_cutoff
 from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
 from lumigraph.units import mm, nm, um
 
@@ -32,7 +33,7 @@ def run(context: Context) -> ExperimentOutcome:
     rows, pictures, lines = [], [], {}
     for distance in DISTANCES:
         limit = sampling.band_limits(GRID, distance, WAVELENGTH)[1]
-        corrected = sampling.corrected_cutoff(GRID, distance, WAVELENGTH)[1]
+        corrected = corrected_cutoff(GRID, distance, WAVELENGTH)[1]
         name = f"z = {distance / mm:g} mm"
         rows += [
             ResultRow(
@@ -57,7 +58,7 @@ def run(context: Context) -> ExperimentOutcome:
         lines[name] = limit * um
     distances = np.geomspace(5 * mm, 500 * mm, 60)
     bands = [sampling.band_limits(GRID, z, WAVELENGTH)[1] * um for z in distances]
-    cutoffs = [sampling.corrected_cutoff(GRID, z, WAVELENGTH)[1] * um for z in distances]
+    cutoffs = [corrected_cutoff(GRID, z, WAVELENGTH)[1] * um for z in distances]
     padded = Grid.square(2 * GRID.shape[0], GRID.pitch[0])
     wide = [sampling.band_limits(padded, z, WAVELENGTH)[1] * um for z in distances]
     drawn = {"band limited": bands, "corrected": cutoffs, "band limited, window doubled": wide}

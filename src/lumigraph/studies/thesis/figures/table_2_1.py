@@ -12,6 +12,7 @@ from lumigraph.errors import SamplingWarning
 from lumigraph.plots import curves
 from lumigraph.propagation import propagate, sampling
 from lumigraph.scene.sources import gaussian_beam
+from lumigraph.studies.thesis.methods import corrected_cutoff
 from lumigraph.studies.thesis.registry import (
     Context,
     ExperimentOutcome,
@@ -84,7 +85,7 @@ def _facts() -> list[ResultRow]:
     doubled = Grid.square(4000, 5 * um)
     pulled = sampling.fresnel_step(grid, WAVELENGTH)[0]
     limits = [sampling.band_limits(window, 1.0, WAVELENGTH)[0] for window in (grid, doubled)]
-    corrected = sampling.corrected_cutoff(grid, 1.0, WAVELENGTH)[0]
+    corrected = corrected_cutoff(grid, 1.0, WAVELENGTH)[0]
     wave = Field(np.ones((2, 2), np.complex64), Grid.square(2, 5 * um), WAVELENGTH)
     scale = propagate(wave, 0.316, "fresnel").grid.pitch[0] / wave.grid.pitch[0] * 2 / 2000
     return [
