@@ -6,7 +6,8 @@
 - `load_camera`, `save_camera`: files of COMPOTE (`compote`) and LFToolbox (`lftoolbox`)
 - `triangulate`: positions of points from their micro-images
 - `datasheet`, `read_charts`, `simulate_charts`, `simulated`: measured properties of a camera, on charts
-- `align`, `watch` (`alignment`): a motorised bench aligned in a closed loop, and kept so
+- `align`, `watch` (`alignment`): a motorised bench aligned in a closed loop, and kept so; `white_camera`
+  of a microscope's
 - `twin`, `BenchModel`, `corrected`: misalignment of a bench from white images, and the corrected camera file
 """
 
@@ -19,6 +20,7 @@ from lumigraph.metrology.alignment.opening import open_bench
 from lumigraph.metrology.alignment.reading import WhiteReader
 from lumigraph.metrology.alignment.setup import BenchSetup, Motor, read_setup
 from lumigraph.metrology.alignment.simulated import SimulatedBench
+from lumigraph.metrology.alignment.stood import white_camera
 from lumigraph.metrology.boards.calibration import Measured, Pose, board
 from lumigraph.metrology.boards.camera import MetricCamera, Nominal
 from lumigraph.metrology.boards.corners import Board, Corners
@@ -86,6 +88,7 @@ __all__ = [
     "triangulate",
     "twin",
     "watch",
+    "white_camera",
 ]
 
 
