@@ -76,7 +76,9 @@ def drawn(camera, seed, exact=False, **options):
     table["motor"] = MOTORS[:-1] if scope else MOTORS
     setup = setup_of(table | ({"known": {"aperture": PUPIL_ERROR}} if scope else {}))
     made = simulated(setup, camera)
-    made.state["aperture"] = PUPIL_ERROR * float(made.rng.standard_normal()) if scope else made.state["aperture"]
+    made.state["aperture"] = (
+        PUPIL_ERROR * float(made.rng.standard_normal()) if scope else made.state["aperture"]
+    )
     made.state["pitch"] = PITCH_ERROR * float(made.rng.standard_normal())
     if exact:
         names = ("camera", "state", "motors", "rng", "noise", "fading", "drift", "vibration", "frozen")

@@ -26,6 +26,7 @@ from lumigraph.calibration import calibrate
 from lumigraph.core import checks, upper_floors
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.lattice import Layout
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
 from lumigraph.core.result import Quantity
@@ -256,9 +257,12 @@ def _stopped(camera: LensletCamera, aperture: float) -> Train:
     return camera.replace(main_lens={"diameter": camera.pupil_diameter * (1 + aperture)}).optics().lens
 
 
-def shown(white: np.ndarray) -> _ShownWhite:
-    """Lattice, slope, width and blur of a white image, with their standard deviations."""
-    found = calibrate(white)
+def shown(white: np.ndarray, layout: Layout | None = None, pitch: float | None = None) -> _ShownWhite:
+    """Lattice, slope, width and blur of a white image, with their standard deviations.
+
+    Layout and pitch [px] are found more quickly where they are given.
+    """
+    found = calibrate(white, layout, pitch)
     index = found.indices.astype(float)
     middle = np.array([n // 2 for n in white.shape], float)
     nearest = index[np.argmin(np.hypot(*(found.centers - middle).T))]

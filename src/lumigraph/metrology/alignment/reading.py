@@ -9,6 +9,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from lumigraph.core.arrays import to_numpy
+from lumigraph.core.lattice import Layout
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.instruments import LensletCamera
@@ -86,7 +87,7 @@ class WhiteReader:
     @cached_property
     def _start(self) -> "tuple[WhiteReading, _Lit]":
         light = BenchModel(self.camera).white(np.zeros(len(CAUSES)))
-        first, lit = _measured(_noisy(light, 0))
+        first, lit = self._measured(_noisy(light, 0))
         return first, lit
 
     @cached_property
@@ -95,7 +96,7 @@ class WhiteReader:
         start, _ = self._start
         model = BenchModel(self.camera)
         lights = [_noisy(model.white([*6 * [0.0], one]), 0) for one in (_STOP, -_STOP)]
-        opened = [_measured(light)[0].values[8] / start.values[8] - 1 for light in lights]
+        opened = [self._measured(light)[0].values[8] / start.values[8] - 1 for light in lights]
         first, second = (opened[0] - opened[1]) / (2 * _STOP), (opened[0] + opened[1]) / (2 * _STOP**2)
         optics = self.camera.optics()
         lengths = (optics.separation, float(optics.lenslet_distance or 0), self.camera.sensor.pixel_pitch)
@@ -120,7 +121,7 @@ class WhiteReader:
         """
         light = self._bare(image, top)
         try:
-            found, lit = _measured(light)
+            found, lit = self._measured(light)
         except CalibrationError as error:
             raise CalibrationError(f"the white image shows no lattice of micro-images: {error}") from None
         lenslets = self._whole(lit)
@@ -193,16 +194,22 @@ class WhiteReader:
         )
         return data - dark
 
+    def _measured(self, white: np.ndarray) -> "tuple[WhiteReading, _Lit]":
+        camera = self.camera
+        return _measured(white, camera.lenslets.layout, camera.micro_image_pitch / camera.sensor.pixel_pitch)
+
     def _whole(self, lit: "_Lit") -> tuple[int, int] | None:
         """Whole lenslets by which an array with these lit micro-images is shifted."""
-        array = {tuple(one) for one in self._start[1].index[self._start[1].lit].tolist()}
+        array = self._array.astype(int)
         if len(array) != math.prod(self.camera.lenslets.count or (0, 0)):
             return None  # the array ends outside the picture
+        reach = int(np.abs(lit.index).max() + np.abs(array).max()) + _FARTHEST
+        there = np.zeros((2 * reach + 1, 2 * reach + 1), bool)
+        there[tuple((array + reach).T)] = True
         span = range(-_FARTHEST, _FARTHEST + 1)
-        seen = list(zip(lit.index.tolist(), lit.lit.tolist(), strict=True))
         score = {
-            (i, j): sum(((y - i, x - j) in array) == bright for (y, x), bright in seen)
-            for i, j in product(span, span)
+            one: int((there[tuple((lit.index - one + reach).T)] == lit.lit).sum())
+            for one in product(span, span)
         }
         (best, most), (_, next_most) = sorted(score.items(), key=lambda one: -one[1])[:2]
         return best if most - next_most >= _CLEARLY else None
@@ -216,9 +223,9 @@ class _Lit:
     lit: np.ndarray
 
 
-def _measured(white: np.ndarray) -> tuple[WhiteReading, _Lit]:
+def _measured(white: np.ndarray, layout: Layout, pitch: float) -> tuple[WhiteReading, _Lit]:
     """Measures, and which micro-images are lit, counted from the one nearest to the middle."""
-    seen = shown(white)
+    seen = shown(white, layout, pitch)
     found = seen.found
     assert found is not None  # `shown` gives it
     middle = np.array([n // 2 for n in white.shape], float)

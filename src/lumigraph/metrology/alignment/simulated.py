@@ -166,7 +166,9 @@ def simulated(setup: BenchSetup, camera: Instrument) -> SimulatedBench:
     }
     options: dict[str, Any] = {name: table[name] for name in ("noise", "fading", "frozen") if name in table}
     shaken = number("[simulated] vibration", table.get("vibration", 0), "shift_x")
-    return SimulatedBench(white_camera(camera), state, tuple(motors), rng, drift=drift, vibration=shaken, **options)
+    return SimulatedBench(
+        white_camera(camera), state, tuple(motors), rng, drift=drift, vibration=shaken, **options
+    )
 
 
 _KEYS = ("seed", "out", "signs", "noise", "fading", "vibration", "drift", "stuck", "frozen")
