@@ -5,8 +5,8 @@ and tilts, ±0.3 mm of height, x and y, ±5 % of the stop, backlash up to 20 µm
 of the light; the devices are those of UniMMCore. The lenslets' pitch is off by what `pitch_error` says.
 ``--exact`` makes the benches' white images lenslet by lenslet (`benchmarks.twin`), not by the operator.
 ``--hours 2`` watches one bench that drifts by 5 µm and 0.01 degree an hour instead, with an exposure a
-minute. ``--camera thesis-plenoptic-1`` takes the thesis' prototype at full size; ``--microscope`` a light-field
-microscope, whose aperture has no motor and is known to 0.05 % (one standard deviation).
+minute. ``--camera thesis-plenoptic-1`` takes the thesis' prototype at full size; ``--microscope`` a
+light-field microscope, whose aperture has no motor and is known to 0.05 % (one standard deviation).
 """
 
 import argparse
@@ -19,10 +19,10 @@ from scipy.stats import chi2
 
 import lumigraph as lg
 from benchmarks import twin
+from lumigraph.instruments.telecentric import is_telecentric
 from lumigraph.metrology.alignment.moves import tolerance
 from lumigraph.metrology.alignment.setup import STATES, setup_of
 from lumigraph.metrology.alignment.simulated import SimulatedBench, simulated
-from lumigraph.metrology.alignment.stood import is_telecentric
 from lumigraph.metrology.alignment.unicore import simulated_devices
 
 PITCH_ERROR = 5e-6

@@ -11,6 +11,7 @@
 - `twin`, `BenchModel`, `corrected`: misalignment of a bench from white images, and the corrected camera file
 """
 
+from lumigraph.instruments.telecentric import white_camera
 from lumigraph.metrology.alignment.align import AlignmentGoal, AlignmentStep, align, watch
 from lumigraph.metrology.alignment.devices import Bench
 from lumigraph.metrology.alignment.drift import drift_rates, drift_table
@@ -20,7 +21,6 @@ from lumigraph.metrology.alignment.opening import open_bench
 from lumigraph.metrology.alignment.reading import WhiteReader
 from lumigraph.metrology.alignment.setup import BenchSetup, Motor, read_setup
 from lumigraph.metrology.alignment.simulated import SimulatedBench
-from lumigraph.metrology.alignment.stood import white_camera
 from lumigraph.metrology.boards.calibration import Measured, Pose, board
 from lumigraph.metrology.boards.camera import MetricCamera, Nominal
 from lumigraph.metrology.boards.corners import Board, Corners

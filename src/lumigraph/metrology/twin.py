@@ -280,7 +280,7 @@ def shown(white: np.ndarray, layout: Layout | None = None, pitch: float | None =
 def leaning_lattice(
     centers: np.ndarray, index: np.ndarray, reach: float, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Lattice vectors, origin and slope (8,) of centres (k, 2) from the picture's middle, with their errors."""
+    """Lattice vectors, origin and slope (8,) of centres (k, 2) from the picture's middle, and errors."""
 
     def off(numbers: np.ndarray) -> np.ndarray:
         return (leaning_centers(numbers, index, reach) - centers).ravel()

@@ -11,6 +11,7 @@ from lumigraph.core import checks
 from lumigraph.core.short_repr import brief
 from lumigraph.errors import LumigraphError
 from lumigraph.instruments import Instrument
+from lumigraph.instruments.telecentric import white_camera
 from lumigraph.metrology.alignment.belief import Belief
 from lumigraph.metrology.alignment.devices import Bench
 from lumigraph.metrology.alignment.log import AlignmentLog
@@ -29,7 +30,6 @@ from lumigraph.metrology.alignment.moves import (
 )
 from lumigraph.metrology.alignment.reading import WhiteReader, WhiteReading
 from lumigraph.metrology.alignment.setup import STATES, shown
-from lumigraph.metrology.alignment.stood import white_camera
 
 _DARK = 0.2  # of the first picture's light: less is lost light
 _CHECKED = 8.0  # standard deviations of a move from which on what it reached is judged

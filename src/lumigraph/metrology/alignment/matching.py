@@ -39,9 +39,9 @@ class MatchedImages:
 
 
 def whole_windows(centers: np.ndarray, half: int, shape: tuple[int, ...]) -> np.ndarray:
-    """Which centres (k, 2) [px] have a window of `half` pixels to each side in the picture (k,)."""
+    """Mask (k,) of centres [px] whose windows of `half` pixels to each side are in the picture."""
     at = np.rint(centers)
-    return ((at >= half + 1) & (at <= np.array(shape) - 2 - half)).all(1)
+    return np.all((at >= half + 1) & (at <= np.array(shape) - 2 - half), axis=1)
 
 
 def matched(image: np.ndarray, predicted: np.ndarray, centers: np.ndarray, half: int) -> MatchedImages:

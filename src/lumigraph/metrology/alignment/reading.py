@@ -13,9 +13,10 @@ from lumigraph.core.lattice import Layout
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.instruments import LensletCamera
+from lumigraph.instruments.telecentric import is_telecentric
 from lumigraph.metrology.alignment.matching import growing, matched, whole_windows
 from lumigraph.metrology.alignment.rays import MEASURES, BenchRays
-from lumigraph.metrology.alignment.stood import is_telecentric, white_of
+from lumigraph.metrology.alignment.stood import white_of
 from lumigraph.metrology.twin import CAUSES, BenchModel, leaning_centers, leaning_lattice, shown
 
 _STOP = 0.04  # part of the stop by which it is opened and closed, for the width's derivative

@@ -9,9 +9,10 @@ import numpy as np
 
 from lumigraph.errors import FormatError
 from lumigraph.instruments import Instrument, LensletCamera
+from lumigraph.instruments.telecentric import white_camera
 from lumigraph.metrology.alignment.moves import BenchError
 from lumigraph.metrology.alignment.setup import STATE_UNITS, STATES, BenchSetup, Motor, number
-from lumigraph.metrology.alignment.stood import white_camera, white_of
+from lumigraph.metrology.alignment.stood import white_of
 
 DRAWN = {"m": 0.3e-3, "rad": math.radians(1), "1": 0.05}
 """How far things are out of place at most that are drawn, by unit."""

@@ -1,4 +1,4 @@
-r"""White images of a bench as it stands, by wave optics; a microscope's as those of a camera 1.0.
+r"""White images of a bench as it stands, by wave optics.
 
 The pupil of a microscope is as if at infinity: its micro-images keep their places when the array is raised
 or tilted, and only their widths :math:`2 (NA/M)\,(b + z)` follow the local height z of the array.
@@ -9,48 +9,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lumigraph.errors import GeometryError
-from lumigraph.instruments import Instrument, LensletCamera, LightFieldMicroscope, PlenopticCamera
+from lumigraph.instruments import LensletCamera
+from lumigraph.instruments.telecentric import is_telecentric
 from lumigraph.metrology.alignment.setup import STATES
 from lumigraph.metrology.twin import CAUSES, BenchModel
 
-FAR = 10.0
-"""Distance of a pupil that counts as infinitely far [m]."""
-
 _NODES = np.array([-1.0, 0.0, 1.0])
 """Local heights of a tilted array, over the largest, that images are made for; the rest is interpolated."""
-
-
-def white_camera(camera: Instrument) -> LensletCamera:
-    """Camera whose white images a bench shows: itself, or one with the evenly lit pupil of a microscope.
-
-    Raises
-    ------
-    GeometryError
-        A camera without lenslets, or a Fourier microscope, whose white images are not discs on a lattice.
-    """
-    if isinstance(camera, LensletCamera):
-        return camera
-    if not isinstance(camera, LightFieldMicroscope) or camera.configuration == "fourier":
-        what = "Fourier microscope" if isinstance(camera, LightFieldMicroscope) else camera.noun
-        raise GeometryError(
-            f"a {what} has no white images of micro-images on a lattice: its bench cannot be aligned. "
-            "Give a plenoptic camera, or a light-field microscope of configuration '1.0' or '2.0'."
-        )
-    part, b = camera.lenslets, camera.lenslet_distance
-    lenslets = part.model_dump(exclude_defaults=True) | {"pitch": part.pitch / (1 + b / FAR)}
-    return PlenopticCamera(
-        wavelength=camera.wavelength, object_distance=1.0,
-        main_lens={"focal_length": 1 / (1 + 1 / FAR), "diameter": camera.pupil_diameter * FAR},
-        lenslets=lenslets, built={"lenslet_distance": b},
-        sensor=camera.pixels.model_dump(exclude_defaults=True)
-        | {"pixel_pitch": camera.pixels.pixel_pitch / camera.relay_magnification, "shape": camera.sensor.shape},
-    )  # fmt: skip
-
-
-def is_telecentric(camera: LensletCamera) -> bool:
-    """True if its pupil is as if at infinity."""
-    return camera.separation >= FAR / 2
 
 
 def white_of(camera: LensletCamera, state: np.ndarray, *, around: float = 0.0) -> np.ndarray:
@@ -65,7 +30,7 @@ def white_of(camera: LensletCamera, state: np.ndarray, *, around: float = 0.0) -
     around
         Width of the sensor's surroundings [m] from which light may be shifted into the picture.
     """
-    values = dict(zip(STATES, np.asarray(state, float).tolist(), strict=True))
+    values: dict[str, float] = dict(zip(STATES, np.asarray(state, float).tolist(), strict=True))
     margin = math.ceil(around / camera.sensor.pixel_pitch)
     model = BenchModel(_stood(camera, values, margin))
     tilted = is_telecentric(camera) and any((values["tilt_y"], values["tilt_x"]))
