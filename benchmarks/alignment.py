@@ -5,7 +5,8 @@ and tilts, ±0.3 mm of height, x and y, ±5 % of the stop, backlash up to 20 µm
 of the light; the devices are those of UniMMCore. The lenslets' pitch is off by what `pitch_error` says.
 ``--exact`` makes the benches' white images lenslet by lenslet (`benchmarks.twin`), not by the operator.
 ``--hours 2`` watches one bench that drifts by 5 µm and 0.01 degree an hour instead, with an exposure a
-minute. ``--camera thesis-plenoptic-1`` takes the thesis' prototype at full size.
+minute. ``--camera thesis-plenoptic-1`` takes the thesis' prototype at full size; ``--microscope`` a
+light-field microscope, whose aperture has no motor and is known to 0.05 % (one standard deviation).
 """
 
 import argparse
@@ -18,6 +19,7 @@ from scipy.stats import chi2
 
 import lumigraph as lg
 from benchmarks import twin
+from lumigraph.instruments.telecentric import is_telecentric
 from lumigraph.metrology.alignment.moves import tolerance
 from lumigraph.metrology.alignment.setup import STATES, setup_of
 from lumigraph.metrology.alignment.simulated import SimulatedBench, simulated
@@ -40,6 +42,18 @@ MOTORS = [
         "backlash": "0.2 %", "limits": ["-20 %", "20 %"],
     },
 ]  # fmt: skip
+PUPIL_ERROR = 5e-4
+"""Of a microscope's aperture, which has no motor."""
+
+
+def microscope(count):
+    """A light-field microscope 20x/0.4 with count x count lenslets."""
+    return lg.LightFieldMicroscope(
+        wavelength="550 nm",
+        objective={"magnification": 20.0, "numerical_aperture": 0.4},
+        lenslets={"pitch": "125 um", "focal_length": "2.5 mm", "count": (count, count)},
+        sensor={"pixel_pitch": "6.5 um", "black_level": 64},
+    )
 
 
 class ExactBench(SimulatedBench):
@@ -57,10 +71,14 @@ class ExactBench(SimulatedBench):
 
 def drawn(camera, seed, exact=False, **options):
     """A bench of UniMMCore's devices, and what it simulates."""
-    setup = setup_of(
-        {"camera": "Camera", "drift": "5 um", "motor": MOTORS, "simulated": {"seed": seed, **options}}
-    )
+    scope = is_telecentric(camera)
+    table = {"camera": "Camera", "drift": "5 um", "simulated": {"seed": seed, **options}}
+    table["motor"] = MOTORS[:-1] if scope else MOTORS
+    setup = setup_of(table | ({"known": {"aperture": PUPIL_ERROR}} if scope else {}))
     made = simulated(setup, camera)
+    made.state["aperture"] = (
+        PUPIL_ERROR * float(made.rng.standard_normal()) if scope else made.state["aperture"]
+    )
     made.state["pitch"] = PITCH_ERROR * float(made.rng.standard_normal())
     if exact:
         names = ("camera", "state", "motors", "rng", "noise", "fading", "drift", "vibration", "frozen")
@@ -146,10 +164,12 @@ def main():
     parser.add_argument("--exact", action="store_true")
     parser.add_argument("--hours", type=float, default=0.0)
     parser.add_argument("--camera")
+    parser.add_argument("--microscope", action="store_true")
     given = parser.parse_args()
-    camera = lg.load_camera(given.camera) if given.camera else twin.camera(given.lenslets)
+    built = microscope if given.microscope else twin.camera
+    camera = lg.load_camera(given.camera) if given.camera else built(given.lenslets)
     began = time.process_time()
-    reader = lg.metrology.WhiteReader(camera)
+    reader = lg.metrology.WhiteReader(lg.metrology.white_camera(camera))
     _ = reader.rays
     print(
         f"{time.process_time() - began:.1f} CPU s once for the camera, {camera.sensor.shape} px", flush=True

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -64,6 +65,9 @@ class ByRays(WhiteReader):
         truth = np.array([self.made.truth()[one] for one in STATES])
         values = self.rays.measures(truth) + NOISE * self.made.rng.standard_normal(9)
         return WhiteReading(values, NOISE, 390.0, (0, 0), np.zeros((4, 2)), float(np.mean(image)))
+
+    def matched(self, image, reading, state):
+        return reading
 
 
 class Dim(SimulatedBench):
@@ -330,6 +334,74 @@ def test_the_verb_aligns_a_bench_of_devices_in_a_process_of_its_own(tmp_path, ca
     assert shown["step"]["status"] == "aligned"
     assert [row[0] for row in shown["step"]["rows"]] == ["shift x", "turn"]
     assert site.calls["step"]({"number": 0})["step"]["instructions"]
+
+
+CONFIGURATION = """
+# Devices
+{stage}
+#py pyDevice,Eye,seeing_devices,Eye
+Property,Core,Initialize,1
+{prefix}Property,Core,XYStage,ArrayXY
+"""
+SEEN = """
+config = "bench.cfg"
+camera = "Eye"
+[[motor]]
+moves = "shift_y"
+device = "ArrayXY"
+coordinate = "y"
+limits = ["-1 mm", "1 mm"]
+[[motor]]
+moves = "shift_x"
+device = "ArrayXY"
+coordinate = "x"
+limits = ["-1 mm", "1 mm"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("stage", "prefix"),
+    [("#py pyDevice,ArrayXY,seeing_devices,XY", "#py "), ("Device,ArrayXY,DemoCamera,DXYStage", "")],
+)
+def test_devices_of_a_micro_manager_configuration_are_aligned(camera, stage, prefix, tmp_path, monkeypatch):
+    """Devices in Python, and Micro-Manager's own where its adapters are installed."""
+    if not prefix:
+        pytest.importorskip("mm_test_adapters", reason="Micro-Manager's adapters are not installed")
+    from lumigraph.metrology.alignment import unicore
+
+    made = simulated(setup_of({"motor": list(MOTORS[1:3]), "simulated": {}}), camera)
+    module = ModuleType("seeing_devices")
+    eye = Dim(camera.replace(sensor={"shape": (8, 8)}), {}, (), np.random.default_rng(0))
+    for name, kind, given in (("XY", unicore._XYStage, list(made.motors)), ("Eye", unicore._Camera, eye)):
+        begun = lambda self, kind=kind, given=given: kind.__init__(self, given)  # noqa: E731
+        setattr(module, name, type(name, (kind,), {"__init__": begun}))
+    monkeypatch.setitem(sys.modules, "seeing_devices", module)
+    (tmp_path / "bench.cfg").write_text(CONFIGURATION.format(stage=stage, prefix=prefix))
+    (tmp_path / "bench.toml").write_text(SEEN)
+    devices = lg.metrology.open_bench(tmp_path / "bench.toml", camera)
+
+    class Out:
+        rng = np.random.default_rng(1)
+
+        def truth(self):
+            x, y = devices.core.getXYPosition("ArrayXY")
+            return dict.fromkeys(STATES, 0.0) | {"shift_y": 2e-4 - y * 1e-6, "shift_x": x * 1e-6 - 1e-4}
+
+    out = Out()
+    (*_, last) = lg.metrology.align(devices, ByRays(camera).shows(out), goal=GOAL)
+    assert last.status == "aligned"
+    assert [one.sign for one in last.belief.motors] == [-1, 1]
+    assert max(abs(out.truth()[one]) for one in ("shift_y", "shift_x")) < 5e-6
+
+
+def test_a_configuration_that_cannot_be_loaded_is_one_line(camera, tmp_path):
+    (tmp_path / "bench.toml").write_text(SEEN)
+    with pytest.raises(BenchError, match=r"no configuration file .*bench.cfg. Correct config"):
+        lg.metrology.open_bench(tmp_path / "bench.toml", camera)
+    (tmp_path / "bench.cfg").write_text("Device,Eye,NoSuchAdapter,Eye\n")
+    with pytest.raises(BenchError, match=r"cannot load .*NoSuchAdapter") as told:
+        lg.metrology.open_bench(tmp_path / "bench.toml", camera)
+    assert "\n" not in str(told.value)
 
 
 def test_moves_are_chosen_for_what_they_tell_only_where_another_exposure_follows():

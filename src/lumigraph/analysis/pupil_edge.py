@@ -108,13 +108,14 @@ def pupil_edge(white: np.ndarray, calibration: Calibration, kind: int | None = N
         )
     start, end = _neighbours(calibration, kind)
     sector = _sector((start + end) / 2, calibration.shape)
-    lines = [_profile(data, start[sector == k], end[sector == k], pitch) for k in range(_SECTORS)]
-    whole = _profile(data, start, end, pitch)
-    if kind is not None:
-        whole, *lines = (line and _near(*line, pitch) for line in (whole, *lines))
-    if whole is None or any(line is None for line in lines):
+    parts = [sector == k for k in range(_SECTORS)]
+    if min(np.sum(one) for one in parts) < 3:
         raise CalibrationError("there are too few whole micro-images for the profile of their edges.")
-    fits = np.array([fitted(*line, pitch) for line in lines if line is not None])
+    sums = [_along(data, start[one], end[one], pitch) for one in parts]
+    whole, *lines = (_profile(*one) for one in (np.sum(sums, 0), *sums))
+    if kind is not None:
+        whole, *lines = (_near(*line, pitch) for line in (whole, *lines))
+    fits = np.array([fitted(*line, pitch) for line in lines])
     width, blur = fitted(*whole, pitch)
     wide = float(student.ppf(0.975, _SECTORS - 1)) / math.sqrt(_SECTORS)
     errors = wide * fits.std(0, ddof=1)
@@ -149,12 +150,8 @@ def _sector(at: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     return 2 * (at[:, 0] > shape[0] / 2) + (at[:, 1] > shape[1] / 2)
 
 
-def _profile(
-    data: np.ndarray, start: np.ndarray, end: np.ndarray, pitch: float
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Light between neighbours (n,) [px], over that of their middles; None of fewer than three pairs."""
-    if len(start) < 3:
-        return None
+def _along(data: np.ndarray, start: np.ndarray, end: np.ndarray, pitch: float) -> np.ndarray:
+    """Number of pixels, and sum of their light over that of the middles, in each bin between neighbours."""
     reach = int(pitch / 2) + 1
     square = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1).T
     pixels = np.rint((start + end) / 2).astype(int)[:, None] + square
@@ -170,8 +167,13 @@ def _profile(
     level = (value * flat).sum(1) / np.maximum(flat.sum(1), 1)
     seen &= (level > 0)[:, None]
     number = (along[seen] / _BIN).astype(int)
-    count = np.bincount(number)
-    light = np.bincount(number, (value / np.where(level > 0, level, 1)[:, None])[seen])
+    bins = int(pitch / _BIN) + 1
+    light = np.bincount(number, (value / np.where(level > 0, level, 1)[:, None])[seen], bins)
+    return np.stack([np.bincount(number, minlength=bins), light])
+
+
+def _profile(count: np.ndarray, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places between neighbours [px], and the mean light there."""
     filled = count > 0
     return (np.flatnonzero(filled) + 0.5) * _BIN, light[filled] / count[filled]
 

@@ -68,14 +68,13 @@ def align(
     above_zero("--pitch-error", pitch_error)
     from lumigraph import metrology, units
     from lumigraph.instruments import load_camera
-    from lumigraph.metrology.datasheet.charts import check_camera
     from lumigraph.preparation.given import read_raw
 
     hours, pause = (0.0 if text is None else units.parse(text, "time") for text in (watch, every))
     if pause <= 0 or hours < 0:
         raise FormatError("--every and --watch must be above 0, such as --watch '2 h' --every '1 min'.")
     goal = metrology.AlignmentGoal(_tolerances(tolerance), pitch_error, exposures)
-    meant = check_camera(load_camera(camera))
+    meant = metrology.white_camera(load_camera(camera))
     opened = metrology.open_bench(bench, meant)
     folder = log or bench.with_suffix(".log")
     reader = metrology.WhiteReader(meant, None if dark is None else read_raw(dark, "dark image"))

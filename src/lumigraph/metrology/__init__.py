@@ -6,10 +6,12 @@
 - `load_camera`, `save_camera`: files of COMPOTE (`compote`) and LFToolbox (`lftoolbox`)
 - `triangulate`: positions of points from their micro-images
 - `datasheet`, `read_charts`, `simulate_charts`, `simulated`: measured properties of a camera, on charts
-- `align`, `watch` (`alignment`): a motorised bench aligned in a closed loop, and kept so
+- `align`, `watch` (`alignment`): a motorised bench aligned in a closed loop, and kept so; `white_camera`
+  of a microscope's
 - `twin`, `BenchModel`, `corrected`: misalignment of a bench from white images, and the corrected camera file
 """
 
+from lumigraph.instruments.telecentric import white_camera
 from lumigraph.metrology.alignment.align import AlignmentGoal, AlignmentStep, align, watch
 from lumigraph.metrology.alignment.devices import Bench
 from lumigraph.metrology.alignment.drift import drift_rates, drift_table
@@ -86,6 +88,7 @@ __all__ = [
     "triangulate",
     "twin",
     "watch",
+    "white_camera",
 ]
 
 

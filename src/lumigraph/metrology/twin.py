@@ -26,6 +26,7 @@ from lumigraph.calibration import calibrate
 from lumigraph.core import checks, upper_floors
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.calibration import Calibration
+from lumigraph.core.lattice import Layout
 from lumigraph.core.progress import Progress, silent
 from lumigraph.core.raw import RawImage
 from lumigraph.core.result import Quantity
@@ -256,28 +257,43 @@ def _stopped(camera: LensletCamera, aperture: float) -> Train:
     return camera.replace(main_lens={"diameter": camera.pupil_diameter * (1 + aperture)}).optics().lens
 
 
-def shown(white: np.ndarray) -> _ShownWhite:
-    """Lattice, slope, width and blur of a white image, with their standard deviations."""
-    found = calibrate(white)
+def shown(white: np.ndarray, layout: Layout | None = None, pitch: float | None = None) -> _ShownWhite:
+    """Lattice, slope, width and blur of a white image, with their standard deviations.
+
+    Layout and pitch [px] are found more quickly where they are given.
+    """
+    found = calibrate(white, layout, pitch)
     index = found.indices.astype(float)
     middle = np.array([n // 2 for n in white.shape], float)
     nearest = index[np.argmin(np.hypot(*(found.centers - middle).T))]
     index = index - nearest
     reach = float(np.abs(found.centers - middle).max())
-
-    def off(numbers: np.ndarray) -> np.ndarray:
-        flat = index @ numbers[:4].reshape(2, 2) + numbers[4:6]
-        return (middle + flat / (1 - flat @ numbers[6:8] / reach**2)[:, None] - found.centers).ravel()
-
     basis = found.lattice.matrix.T
     start = np.concatenate([basis.ravel(), found.centers[np.argmin(np.hypot(*index.T))] - middle, [0.0, 0.0]])
-    fit = least_squares(off, start, method="lm")
-    spread = 2 * fit.cost / max(len(fit.fun) - len(fit.x), 1)
-    errors = np.sqrt(np.diag(np.linalg.inv(fit.jac.T @ fit.jac)) * spread)
+    numbers, errors = leaning_lattice(found.centers - middle, index, reach, start)
     edge = pupil_edge(white, found)
     half = [edge.width_error / 1.96, edge.blur_error / 1.96]
-    values = np.concatenate([fit.x, [edge.width, edge.blur]])
+    values = np.concatenate([numbers, [edge.width, edge.blur]])
     return _ShownWhite(values, np.concatenate([errors, half]), reach, found)
+
+
+def leaning_lattice(
+    centers: np.ndarray, index: np.ndarray, reach: float, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lattice vectors, origin and slope (8,) of centres (k, 2) from the picture's middle, and errors."""
+
+    def off(numbers: np.ndarray) -> np.ndarray:
+        return (leaning_centers(numbers, index, reach) - centers).ravel()
+
+    fit = least_squares(off, start, method="lm")
+    spread = 2 * fit.cost / max(len(fit.fun) - len(fit.x), 1)
+    return fit.x, np.sqrt(np.diag(np.linalg.inv(fit.jac.T @ fit.jac)) * spread)
+
+
+def leaning_centers(numbers: np.ndarray, index: np.ndarray, reach: float) -> np.ndarray:
+    """Centres (k, 2) from the picture's middle, of lattice vectors, origin and slope (8,)."""
+    flat = index @ numbers[:4].reshape(2, 2) + numbers[4:6]
+    return flat / (1 - flat @ numbers[6:8] / reach**2)[:, None]
 
 
 def twin(

@@ -9,7 +9,7 @@ from lumigraph.core import checks
 from lumigraph.errors import FormatError
 from lumigraph.metrology.alignment.log import AlignmentLog
 from lumigraph.metrology.alignment.setup import shown
-from lumigraph.viewer.page import MEDIA, static
+from lumigraph.viewer.page import MEDIA, html_of, static
 from lumigraph.viewer.server import Resource, Site
 
 _KEPT = ("number", "seconds", "status", "notes", "instructions", "shape", "centers")
@@ -23,7 +23,7 @@ def alignment_site(folder: Path) -> Site:
     folder
         Of the log; it may be written later.
     """
-    resources = {"": Resource(MEDIA[".html"], static("alignment.html").encode())}
+    resources = {"": Resource(MEDIA[".html"], html_of("alignment.html").encode())}
     for name in ("alignment.js", "style.css", "alignment.css"):
         resources[f"app/{name}"] = Resource(MEDIA[Path(name).suffix], static(name).encode())
     log = AlignmentLog(folder)

@@ -17,7 +17,7 @@ from lumigraph.errors import FormatError, GeometryError
 from lumigraph.instruments import Instrument
 from lumigraph.instruments.point_view import PointImage
 from lumigraph.viewer.designer_curves import trade_offs
-from lumigraph.viewer.page import static
+from lumigraph.viewer.page import html_of, static
 from lumigraph.viewer.server import Resource, Site
 
 MODULES = ("designer_charts.js", "designer_controls.js", "designer.js")
@@ -39,7 +39,7 @@ def designer_site(camera: Instrument, name: str) -> Site:
         Of its file, shown and proposed for saving.
     """
     script, style = "text/javascript; charset=utf-8", "text/css; charset=utf-8"
-    resources = {"": Resource("text/html; charset=utf-8", static("designer.html").encode())}
+    resources = {"": Resource("text/html; charset=utf-8", html_of("designer.html").encode())}
     for file in MODULES:
         resources[f"app/{file}"] = Resource(script, static(file).encode())
     for file in ("style.css", "designer.css"):

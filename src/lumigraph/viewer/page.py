@@ -37,6 +37,12 @@ def static(name: str) -> str:
     return files("lumigraph.viewer").joinpath("static", name).read_text("utf-8")
 
 
+@cache
+def html_of(name: str) -> str:
+    """A page of HTML, with the head that all pages have."""
+    return static(name).replace("<!-- head.html -->\n", static("head.html"), 1)
+
+
 def site(exhibits: Sequence[Exhibit]) -> Site:
     """The viewer's page and one or two exhibits' arrays, as a table to serve."""
     return site_of([Parts.of(exhibit) for exhibit in exhibits])
@@ -44,7 +50,7 @@ def site(exhibits: Sequence[Exhibit]) -> Site:
 
 def site_of(parts: Sequence[Parts], pack: Pack = lambda name, part, coded: coded.as_bytes()) -> Site:
     """Site of exhibits that are described already; see `site`."""
-    resources = {"": Resource(MEDIA[".html"], static("index.html").encode())}
+    resources = {"": Resource(MEDIA[".html"], html_of("index.html").encode())}
     for name in (*MODULES, "style.css"):
         resources[f"app/{name}"] = Resource(MEDIA[PurePath(name).suffix], static(name).encode())
     resources["data/about"] = Resource("application/json", json.dumps(about(parts)).encode())

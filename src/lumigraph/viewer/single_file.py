@@ -13,7 +13,7 @@ from lumigraph.errors import LumigraphError
 from lumigraph.io.target import check_target, write_bytes
 from lumigraph.viewer.exhibit import Exhibit
 from lumigraph.viewer.packing import check_quality, packed
-from lumigraph.viewer.page import MODULES, about, pictures, static
+from lumigraph.viewer.page import MODULES, about, html_of, pictures, static
 from lumigraph.viewer.parts import Parts
 
 LARGEST = 400 << 20
@@ -99,7 +99,7 @@ def document(description: str, blobs: dict[str, str]) -> str:
         f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; "
         "img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
-    page = static("index.html")
+    page = html_of("index.html")
     data = [_inert("data-about", "application/json", description.replace("<", "\\u003c"))]
     data += [_inert(f"data-{name}", "text/plain", blob) for name, blob in blobs.items()]
     head = f'<meta http-equiv="Content-Security-Policy" content="{policy}">'

@@ -10,7 +10,8 @@ import numpy as np
 from lumigraph.core import checks
 from lumigraph.core.short_repr import brief
 from lumigraph.errors import LumigraphError
-from lumigraph.instruments import LensletCamera
+from lumigraph.instruments import Instrument
+from lumigraph.instruments.telecentric import white_camera
 from lumigraph.metrology.alignment.belief import Belief
 from lumigraph.metrology.alignment.devices import Bench
 from lumigraph.metrology.alignment.log import AlignmentLog
@@ -148,7 +149,7 @@ class AlignmentStep:
 
 def align(
     bench: Bench,
-    camera: LensletCamera | WhiteReader,
+    camera: Instrument | WhiteReader,
     *,
     goal: AlignmentGoal | None = None,
     log: str | PathLike[str] | None = None,
@@ -182,7 +183,7 @@ def align(
 
 def watch(
     bench: Bench,
-    camera: LensletCamera | WhiteReader,
+    camera: Instrument | WhiteReader,
     *,
     seconds: float,
     every: float = 60.0,
@@ -236,11 +237,11 @@ class _Loop:
     def of(
         cls,
         bench: Bench,
-        camera: LensletCamera | WhiteReader,
+        camera: Instrument | WhiteReader,
         goal: AlignmentGoal,
         log: str | PathLike[str] | None,
     ) -> "_Loop":
-        reader = camera if isinstance(camera, WhiteReader) else WhiteReader(camera)
+        reader = camera if isinstance(camera, WhiteReader) else WhiteReader(white_camera(camera))
         kept = None if log is None else AlignmentLog.at(log)
         if kept is not None:
             motors = [[str(value) for value in asdict(one).values()] for one in bench.setup.motors]
@@ -292,6 +293,8 @@ class _Loop:
             picture = self.bench.expose()
             reading = self.reader.read(picture, self.bench.top)
             self._check_light(reading)
+            guess = self._freed().seen(self.reader.rays, reading)
+            reading = self.reader.matched(picture, reading, guess.mean[: len(STATES)])
             reached = self._judged(reading)
             self.belief = self.belief.seen(self.reader.rays, reading)
             self._check_progress(positions)
@@ -359,14 +362,18 @@ class _Loop:
                 "Check lamp and shutter."
             )
 
+    def _freed(self) -> Belief:
+        """Belief if motors may have done anything in the last moves."""
+        free = self.belief
+        for move in self.pending:
+            free = free.widened(free.motors[move.number].moves, 2 * abs(move.end - move.start))
+        return free
+
     def _judged(self, reading: WhiteReading) -> dict[str, tuple[float, float]]:
         """Changes expected and reached by the last moves; refuses motors that do not obey."""
-        free, motors = self.belief, self.belief.motors
         if not self.pending:
             return {}
-        for move in self.pending:
-            free = free.widened(motors[move.number].moves, 2 * abs(move.end - move.start))
-        free = free.seen(self.reader.rays, reading)
+        free, motors = self._freed().seen(self.reader.rays, reading), self.belief.motors
         reached, signs = {}, {}
         for move in self.pending:
             motor, way = motors[move.number], move.end - move.start

@@ -25,7 +25,7 @@ SCALE = 2e-3
 
 _MOVED = 0.5e-3  # of sensor and main lens that have motors, unless the bench file says [m]
 _ROUNDS = 4
-_FAR = (*4 * (3e-4,), *2 * (1e-4,), *2 * (0.06,), 0.02)
+_FAR = (*4 * (3e-4,), *2 * (1e-4,), *2 * (0.06,), 0.02, *2 * (0.06,))
 """Errors of `BenchRays.measures`, over how far they are from those of the camera file."""
 
 _ASIDE = 0.15, 2e-3
@@ -129,7 +129,8 @@ class Belief:
 
     def expected(self, rays: BenchRays) -> "Belief":
         """Belief after an exposure that shows what is expected, with the bench where it is thought to be."""
-        noise = np.diag(np.array([*4 * [1e-4], *2 * [1.5e-3], *2 * [1e-3], 5e-3]) ** 2)
+        noise = np.diag(np.array([*4 * [1e-4], *2 * [1.5e-3], *2 * [1e-3], 5e-3, *2 * [1e-3]]) ** 2)
+        noise = noise[: len(rays.start), : len(rays.start)]
         return replace(self, covariance=self._after(self._slopes(rays, self.mean), noise))
 
     def _after(self, slopes: np.ndarray, noise: np.ndarray) -> np.ndarray:
@@ -166,6 +167,6 @@ def _rest(rays: BenchRays, reading: WhiteReading, mean: np.ndarray) -> np.ndarra
 def _noise(rays: BenchRays, reading: WhiteReading) -> np.ndarray:
     away = np.abs(reading.values - rays.start)
     away[:4], away[4:6], away[6:8] = away[:4].max(), away[4:6].max(), away[6:8].max()
-    variance = reading.errors**2 + (np.array(_FAR) * away) ** 2
-    variance[6:8] += _ASIDE[1] ** 2 if away[4] > _ASIDE[0] else 0.0
+    variance = reading.errors**2 + (np.array(_FAR)[: len(away)] * away) ** 2
+    variance[6:8] += _ASIDE[1] ** 2 if away[4] > _ASIDE[0] and not reading.matched else 0.0
     return np.diag(variance)

@@ -3,13 +3,13 @@
 from os import PathLike
 
 from lumigraph.errors import FormatError
-from lumigraph.instruments import LensletCamera
+from lumigraph.instruments import Instrument
 from lumigraph.metrology.alignment.devices import Bench
 from lumigraph.metrology.alignment.setup import BenchSetup, read_setup
 from lumigraph.metrology.alignment.simulated import simulated
 
 
-def open_bench(setup: BenchSetup | str | PathLike[str], camera: LensletCamera) -> Bench:
+def open_bench(setup: BenchSetup | str | PathLike[str], camera: Instrument) -> Bench:
     """Bench of a file: Micro-Manager's devices of its `config`, or simulated ones that show `camera`.
 
     Raises

@@ -6,6 +6,8 @@ A lenslet at c of the array, which is turned, shifted and tilted by θ along n, 
 
 by rays through the middle of the stop (docs/theory/metric.md). So the lattice vectors grow by
 :math:`(1 + b/L)`, the slope is :math:`\tan\theta / (L + b)`, and the stop's image is :math:`D b / L` wide.
+Before a telecentric array, L is so large that the first two are lost; there the widths' growth over the
+picture shows the tilt, by the part :math:`\tan\theta / b` a metre.
 """
 
 import math
@@ -16,7 +18,10 @@ import numpy as np
 from lumigraph.metrology.alignment.setup import STATES
 
 MEASURES = 9
-"""Two lattice vectors, origin, slope and width (see `twin.shown`) [px]."""
+"""Two lattice vectors, origin, slope and width (see `twin.shown`) [px].
+
+Of a telecentric bench there follow the growths of the width along y and x [1 over the reach].
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +33,7 @@ class BenchRays:
     lengths
         Main lens to array, array to sensor, and a pixel [m].
     start
-        Measures (9,) of the white image of the camera file.
+        Measures (9 or 11,) of the white image of the camera file.
     reach
         Distance from the middle that its slope refers to [px].
     width
@@ -42,7 +47,7 @@ class BenchRays:
     width: tuple[float, float] = (1.0, 0.0)
 
     def measures(self, state: np.ndarray) -> np.ndarray:
-        """Measures (9,) of a bench with these `STATES` (10,)."""
+        """Measures (9 or 11,) of a bench with these `STATES` (10,)."""
         value = dict(zip(STATES, state.tolist(), strict=True))
         L, b, pixel = self.lengths
         near, far = L - value["height"] + value["separation"], b + value["height"] + value["sensor"]
@@ -57,10 +62,11 @@ class BenchRays:
         image = (1 + value["aperture"]) * (far / near) / (b / L) - 1
         first, second = self.width
         width = self.start[8] * (1 + first * image + second * image**2)
-        return np.concatenate([lattice.ravel(), origin, leaning, [width]])
+        growing = self.reach * pixel * slope / far if len(self.start) > MEASURES else ()
+        return np.concatenate([lattice.ravel(), origin, leaning, [width], growing])
 
     def slopes(self, state: np.ndarray) -> np.ndarray:
-        """Derivatives (9, 10) of the measures by the states."""
+        """Derivatives (9 or 11, 10) of the measures by the states."""
         columns = []
         for k in range(len(STATES)):
             step = np.eye(len(STATES))[k] * 1e-6

@@ -9,24 +9,33 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from lumigraph.core.arrays import to_numpy
+from lumigraph.core.lattice import Layout
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import CalibrationError
 from lumigraph.instruments import LensletCamera
+from lumigraph.instruments.telecentric import is_telecentric
+from lumigraph.metrology.alignment.matching import growing, matched, whole_windows
 from lumigraph.metrology.alignment.rays import MEASURES, BenchRays
-from lumigraph.metrology.twin import CAUSES, BenchModel, shown
+from lumigraph.metrology.alignment.stood import white_of
+from lumigraph.metrology.twin import CAUSES, BenchModel, leaning_centers, leaning_lattice, shown
 
 _STOP = 0.04  # part of the stop by which it is opened and closed, for the width's derivative
 _FARTHEST = 4  # whole lenslets by which an array may be shifted
 _NOISE = 0.0025
 """Noise of the camera file's white image, of its brightest pixel: it decides what is used."""
 
-_TILT, _COPIES = 2e-5, 5  # rad by which such an image may err, and how many are averaged at most
+_TILT = 5e-5
+"""Error of tilts [rad] from which on a picture is compared with a predicted one, pixel by pixel."""
+
+_LEFT = 3e-6, 1e-4, 1e-4  # px of lattice vectors, origin and slope that such a comparison may err by
 _SATURATED = 1e-3
 """Part of the pixels from which on a picture is too bright."""
 
 _LIT = 0.4
 """Light in the middle of a lit micro-image at least, over the usual one's."""
 
+_UNSEEN = 10.0  # growth of widths that one picture alone does not show
+_FEWEST = 16  # micro-images that are compared at least
 _CLEARLY = 5  # micro-images by which one shift fits better than the next
 _PLACED = 1e-3  # px, as in `twin`
 _PERIODIC = 5e-5  # px of lattice vectors: what pixels do to the fit of far and near lattices alike
@@ -48,6 +57,8 @@ class WhiteReading:
         Micro-images (k, 2) [px].
     brightness
         Mean of the picture.
+    matched
+        Whether it was compared with a predicted picture: then pixels make no errors of their own.
     """
 
     values: np.ndarray
@@ -56,6 +67,7 @@ class WhiteReading:
     lenslets: tuple[int, int] | None
     centers: np.ndarray
     brightness: float
+    matched: bool = False
 
 
 @dataclass(frozen=True, eq=False)  # without slots: it keeps what is computed
@@ -65,7 +77,7 @@ class WhiteReader:
     Parameters
     ----------
     camera
-        What the bench is meant to be.
+        What the bench is meant to be; of a microscope, its `white_camera`.
     dark
         Picture without light; None for the sensor's black level.
     """
@@ -76,13 +88,8 @@ class WhiteReader:
     @cached_property
     def _start(self) -> "tuple[WhiteReading, _Lit]":
         light = BenchModel(self.camera).white(np.zeros(len(CAUSES)))
-        first, lit = _measured(_noisy(light, 0))
-        b, pixel = self.camera.lenslet_distance, self.camera.sensor.pixel_pitch
-        lever = first.reach**2 * pixel / (self.camera.separation + b)
-        count = math.ceil((float(first.errors[6:8].max()) / (_TILT * lever)) ** 2)
-        others = [_measured(_noisy(light, k))[0].values for k in range(1, min(count, _COPIES))]
-        values, errors = np.mean([first.values, *others], 0), first.errors / math.sqrt(1 + len(others))
-        return replace(first, values=values, errors=errors), lit
+        first, lit = self._measured(_noisy(light, 0))
+        return first, lit
 
     @cached_property
     def rays(self) -> BenchRays:
@@ -90,11 +97,13 @@ class WhiteReader:
         start, _ = self._start
         model = BenchModel(self.camera)
         lights = [_noisy(model.white([*6 * [0.0], one]), 0) for one in (_STOP, -_STOP)]
-        opened = [_measured(light)[0].values[8] / start.values[8] - 1 for light in lights]
+        opened = [self._measured(light)[0].values[8] / start.values[8] - 1 for light in lights]
         first, second = (opened[0] - opened[1]) / (2 * _STOP), (opened[0] + opened[1]) / (2 * _STOP**2)
         optics = self.camera.optics()
         lengths = (optics.separation, float(optics.lenslet_distance or 0), self.camera.sensor.pixel_pitch)
-        return BenchRays(lengths, start.values, start.reach, (float(first), float(second)))
+        growing = np.zeros(2 * is_telecentric(self.camera))
+        measures = np.concatenate([start.values, growing])
+        return BenchRays(lengths, measures, start.reach, (float(first), float(second)))
 
     def read(self, image: np.ndarray, top: float | None = None) -> WhiteReading:
         """Measures of a white image (y, x).
@@ -113,7 +122,7 @@ class WhiteReader:
         """
         light = self._bare(image, top)
         try:
-            found, lit = _measured(light)
+            found, lit = self._measured(light)
         except CalibrationError as error:
             raise CalibrationError(f"the white image shows no lattice of micro-images: {error}") from None
         lenslets = self._whole(lit)
@@ -123,7 +132,50 @@ class WhiteReader:
             values[4:6] += np.array(lenslets) @ values[:4].reshape(2, 2)
         errors[:4] = np.hypot(errors[:4], _PERIODIC)
         errors[4:6] = np.hypot(errors[4:6], _PLACED)
+        unseen = len(self.rays.start) - MEASURES
+        values, errors = np.append(values, unseen * [0.0]), np.append(errors, unseen * [_UNSEEN])
         return replace(found, values=values, errors=errors, reach=self.rays.reach, lenslets=lenslets)
+
+    def matched(self, image: np.ndarray, reading: WhiteReading, state: np.ndarray) -> WhiteReading:
+        """Measures of the same image (y, x) beside the one that `STATES` (10,) near the truth predict.
+
+        The reading itself where it is sure of the tilts anyway, or where the prediction is another picture.
+        """
+        rays, telecentric = self.rays, is_telecentric(self.camera)
+        lever = rays.reach**2 * rays.lengths[2] / sum(rays.lengths[:2])
+        if reading.errors[6:8].max() < _TILT * lever and not telecentric:
+            return reading
+        light, predicted = self._bare(image, None), white_of(self.camera, state)
+        numbers, middle = rays.measures(state), np.array([n // 2 for n in light.shape])
+        centers = leaning_centers(numbers, self._array, rays.reach) + middle
+        half = int(math.sqrt(abs(np.linalg.det(numbers[:4].reshape(2, 2)))) / 2) - 1
+        whole = whole_windows(centers, half, light.shape)
+        index, centers = self._array[whole], centers[whole]
+        if len(index) < _FEWEST or not (seen := matched(light, predicted, centers, half)).near:
+            return reading
+        placed = centers + seen.displacement - middle
+        found, errors = leaning_lattice(placed, index, rays.reach, numbers[:8])
+        values, deviations = reading.values.copy(), reading.errors.copy()
+        values[:8], deviations[:8] = found, np.hypot(errors, np.repeat(_LEFT, (4, 2, 2)))
+        if telecentric:
+            growth, error = growing((centers - middle) / rays.reach, seen.widening)
+            values[MEASURES:], deviations[MEASURES:] = numbers[MEASURES:] + growth / self._widening, error
+        return replace(reading, values=values, errors=deviations, matched=True)
+
+    @cached_property
+    def _array(self) -> np.ndarray:
+        """Indices (k, 2) of the lenslets whose micro-images the camera file shows."""
+        _, lit = self._start
+        return lit.index[lit.lit].astype(float)
+
+    @cached_property
+    def _widening(self) -> float:
+        """Widening that `matched` finds, over that of the micro-images' whole images."""
+        model, centers = BenchModel(self.camera), self._start[0].centers
+        lights = [model.white([*6 * [0.0], one]) for one in (0.0, _STOP / 4)]
+        half = int(math.sqrt(abs(np.linalg.det(self.rays.start[:4].reshape(2, 2)))) / 2) - 1
+        whole = whole_windows(centers, half, lights[0].shape)
+        return float(np.mean(matched(lights[1], lights[0], centers[whole], half).widening)) / (_STOP / 4)
 
     def _bare(self, image: np.ndarray, top: float | None) -> np.ndarray:
         shape, data = self.camera.sensor.shape, np.asarray(image, float)
@@ -143,16 +195,22 @@ class WhiteReader:
         )
         return data - dark
 
+    def _measured(self, white: np.ndarray) -> "tuple[WhiteReading, _Lit]":
+        camera = self.camera
+        return _measured(white, camera.lenslets.layout, camera.micro_image_pitch / camera.sensor.pixel_pitch)
+
     def _whole(self, lit: "_Lit") -> tuple[int, int] | None:
         """Whole lenslets by which an array with these lit micro-images is shifted."""
-        array = {tuple(one) for one in self._start[1].index[self._start[1].lit].tolist()}
+        array = self._array.astype(int)
         if len(array) != math.prod(self.camera.lenslets.count or (0, 0)):
             return None  # the array ends outside the picture
+        reach = int(np.abs(lit.index).max() + np.abs(array).max()) + _FARTHEST
+        there = np.zeros((2 * reach + 1, 2 * reach + 1), bool)
+        there[tuple((array + reach).T)] = True
         span = range(-_FARTHEST, _FARTHEST + 1)
-        seen = list(zip(lit.index.tolist(), lit.lit.tolist(), strict=True))
         score = {
-            (i, j): sum(((y - i, x - j) in array) == bright for (y, x), bright in seen)
-            for i, j in product(span, span)
+            one: int((there[tuple((lit.index - one + reach).T)] == lit.lit).sum())
+            for one in product(span, span)
         }
         (best, most), (_, next_most) = sorted(score.items(), key=lambda one: -one[1])[:2]
         return best if most - next_most >= _CLEARLY else None
@@ -166,9 +224,9 @@ class _Lit:
     lit: np.ndarray
 
 
-def _measured(white: np.ndarray) -> tuple[WhiteReading, _Lit]:
+def _measured(white: np.ndarray, layout: Layout, pitch: float) -> tuple[WhiteReading, _Lit]:
     """Measures, and which micro-images are lit, counted from the one nearest to the middle."""
-    seen = shown(white)
+    seen = shown(white, layout, pitch)
     found = seen.found
     assert found is not None  # `shown` gives it
     middle = np.array([n // 2 for n in white.shape], float)

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from lumigraph.errors import FormatError
-from lumigraph.instruments import LensletCamera
+from lumigraph.instruments import Instrument, LensletCamera
+from lumigraph.instruments.telecentric import white_camera
 from lumigraph.metrology.alignment.moves import BenchError
 from lumigraph.metrology.alignment.setup import STATE_UNITS, STATES, BenchSetup, Motor, number
-from lumigraph.metrology.twin import CAUSES, BenchModel
+from lumigraph.metrology.alignment.stood import white_of
 
 DRAWN = {"m": 0.3e-3, "rad": math.radians(1), "1": 0.05}
 """How far things are out of place at most that are drawn, by unit."""
@@ -129,26 +130,10 @@ class SimulatedBench:
         shaken = dict(truth)
         for name in ("shift_y", "shift_x"):
             shaken[name] += self.vibration * self.rng.standard_normal()
-        margin = math.ceil(_AROUND / self.camera.sensor.pixel_pitch)
-        light = BenchModel(self._stood(shaken, margin)).white([shaken[one] for one in CAUSES])
-        return light[margin:-margin, margin:-margin]
-
-    def _stood(self, truth: Mapping[str, float], margin: int) -> LensletCamera:
-        """The camera with distances and a pitch that are not those of `CAUSES`, and more pixels around."""
-        camera = self.camera
-        built = {
-            "separation": camera.separation + truth["separation"],
-            "lenslet_distance": camera.lenslet_distance + truth["sensor"],
-        }
-        lenslets = {"pitch": camera.lenslets.pitch * (1 + truth["pitch"])}
-        shape = tuple(n + 2 * margin for n in camera.sensor.shape)
-        return camera.replace(
-            lenslets=lenslets if truth["pitch"] else {}, built=built, sensor={"shape": shape},
-            main_lens={"diameter": camera.pupil_diameter},
-        )  # fmt: skip
+        return white_of(self.camera, np.array([shaken[one] for one in STATES]), around=_AROUND)
 
 
-def simulated(setup: BenchSetup, camera: LensletCamera) -> SimulatedBench:
+def simulated(setup: BenchSetup, camera: Instrument) -> SimulatedBench:
     """Bench of the table ``[simulated]`` of a bench file.
 
     `seed` draws what is out of place, each motor's sign and its backlash; `out` sets what is out of place;
@@ -182,7 +167,9 @@ def simulated(setup: BenchSetup, camera: LensletCamera) -> SimulatedBench:
     }
     options: dict[str, Any] = {name: table[name] for name in ("noise", "fading", "frozen") if name in table}
     shaken = number("[simulated] vibration", table.get("vibration", 0), "shift_x")
-    return SimulatedBench(camera, state, tuple(motors), rng, drift=drift, vibration=shaken, **options)
+    return SimulatedBench(
+        white_camera(camera), state, tuple(motors), rng, drift=drift, vibration=shaken, **options
+    )
 
 
 _KEYS = ("seed", "out", "signs", "noise", "fading", "vibration", "drift", "stuck", "frozen")

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pymmcore_plus import CMMCorePlus
 from pymmcore_plus.experimental.unicore import (
     GenericDevice,
     SimpleCameraDevice,
@@ -29,25 +28,34 @@ def loaded(setup: BenchSetup) -> Bench:
     BenchError
         The file cannot be loaded.
     """
-    core = CMMCorePlus()
+    path = Path(setup.config or "")
+    if not path.is_file():
+        raise BenchError(f"there is no configuration file {path}. Correct config in the bench file.")
+    core = _quiet_core()
     try:
-        core.loadSystemConfiguration(Path(setup.config or ""))
+        core.loadSystemConfiguration(path)
     except Exception as error:
         raise BenchError(
-            f"Micro-Manager cannot load {setup.config}: {' '.join(str(error).split())[:200]}"
+            f"Micro-Manager cannot load {path}: {' '.join(str(error).split())[:240]}. Correct that line, "
+            "or install its device adapters: mmcore install."
         ) from error
     return Bench(core, setup)
 
 
-def simulated_devices(setup: BenchSetup, bench: SimulatedBench) -> Bench:
-    """Bench whose devices are simulated, each behind Micro-Manager's interface."""
+def _quiet_core() -> UniMMCore:
+    """Core for devices in Python and, where Micro-Manager is installed, its own; silent where it is not."""
     logger = logging.getLogger("pymmcore-plus")
     level = logger.level
-    logger.setLevel(logging.CRITICAL)  # no installation of Micro-Manager is needed
+    logger.setLevel(logging.CRITICAL)
     try:
-        core = UniMMCore()
+        return UniMMCore()
     finally:
         logger.setLevel(level)
+
+
+def simulated_devices(setup: BenchSetup, bench: SimulatedBench) -> Bench:
+    """Bench whose devices are simulated, each behind Micro-Manager's interface."""
+    core = _quiet_core()
     core.loadPyDevice(setup.camera, _Camera(bench))
     for label in dict.fromkeys(one.device for one in setup.motors):
         core.loadPyDevice(label, _device([one for one in bench.motors if one.motor.device == label]))
