@@ -46,6 +46,25 @@ def test_positions_in_names_say_at_which_end_the_numbers_begin(tmp_path, sign_y,
     assert found.aperture.pitch == pytest.approx((5.5, 4.0))
 
 
+def test_positions_whose_y_counts_up_are_read_as_the_pictures_show(tmp_path):
+    """Three rows of cameras above each other, whose pictures move up from one to the next."""
+    texture = np.random.default_rng(0).integers(0, 255, (60, 60), np.uint8)
+    for row in range(3):
+        for column in range(3):
+            name = f"out_{row:02}_{column:02}_{-5.0 * row:.6f}_{5.0 * column:.6f}.png"
+            lg.save(texture[2 * row : 2 * row + 50, 2 * column : 2 * column + 50], tmp_path / name)
+    with pytest.warns(SamplingWarning, match="the y in its names counts up"):
+        found = lg.open(tmp_path)
+    np.testing.assert_array_equal(found.data[0, 0], texture[4:54, 4:54])
+
+
+def test_views_counted_through_are_doubted_as_one_row(tmp_path):
+    for k in range(9):
+        lg.save(np.full((4, 5), k, np.uint8), tmp_path / f"bench2_{k:03}.png")
+    with pytest.warns(SamplingWarning, match="names 9 views of one row, 2. If they are 3 rows of as many"):
+        assert lg.open(tmp_path).data.shape[:2] == (1, 9)
+
+
 def test_two_pictures_of_one_view_are_refused(tmp_path):
     for name in ("view_00_00.png", "depth_00_00.png"):
         lg.save(np.ones((4, 5), np.uint8), tmp_path / name)
