@@ -110,6 +110,32 @@ def test_a_hyperstack_keeps_its_axes(tmp_path):
     np.testing.assert_array_equal(found.data.reshape(PLANES.shape), PLANES)
 
 
+def test_planes_of_other_shapes_are_read_as_they_are_meant_or_refused(tmp_path):
+    path, colour = tmp_path / "a.tif", VIEWS[0, 0]
+    tifffile.imwrite(path, colour, photometric="minisblack")  # eight pages, each three pixels wide
+    np.testing.assert_array_equal(lg.open(path).data, colour)
+    tifffile.imwrite(path, PLANES[0, 0], photometric="minisblack", volumetric=True, tile=(16, 16, 16))
+    with pytest.raises(FormatError, match="holds 4 planes in one page"):
+        lg.open(path)
+    with tifffile.TiffWriter(path) as file:  # a thumbnail before the picture
+        file.write(PLANES[0, 0, 0, ::2, ::2], subfiletype=1)
+        file.write(PLANES[0, 0, 0])
+    with pytest.raises(FormatError, match="page 1 has another size"):
+        lg.open(path)
+    np.testing.assert_array_equal(lg.open(path, page=1).data, PLANES[0, 0, 0])
+
+
+def test_arrays_whose_last_axis_counts_pictures_are_asked_for(tmp_path):
+    stack = np.arange(50 * 60 * 5).reshape(50, 60, 5)  # (y, x, n)
+    scipy.io.savemat(tmp_path / "a.mat", {"stack": stack})
+    with pytest.raises(
+        FormatError, match=r"axes='nyx' \(50 of 60 x 5 px\) or axes='yxn' \(5 of 50 x 60 px\)"
+    ):
+        lg.open(tmp_path / "a.mat")
+    assert [part.noun for part in lg.contents(tmp_path / "a.mat")] == ["array"]
+    np.testing.assert_array_equal(lg.open(tmp_path / "a.mat", axes="yxn").data[1], stack[..., 1])
+
+
 def test_planes_in_files_beside_are_read_or_named(tmp_path):
     path, plane = tmp_path / "a.ome.tif", PLANES[0, 0]
     write_pages(

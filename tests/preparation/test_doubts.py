@@ -101,7 +101,8 @@ def test_an_offset_left_in_is_measured_and_none_is_where_there_is_none():
     ("turned", "told"),
     [
         (lambda a: a, None), (lambda a: a[::-1, ::-1], None), (lambda a: a[:, ::-1], "columns mirrored"),
-        (lambda a: a.swapaxes(0, 1), "rows and columns swapped"), (lambda a: a[:2, 1::-1], "columns mirrored"),
+        (lambda a: a.swapaxes(0, 1), "rows and columns swapped"),
+        (lambda a: a[:2, 1::-1], "columns mirrored"),
     ],
 )  # fmt: skip
 def test_views_out_of_order_are_named(turned, told):
