@@ -34,6 +34,13 @@ def test_full_pixels_are_seen_whatever_the_container(top, shift):
     assert saturation_level(RawImage(values, bit_depth=16)) == top << shift
 
 
+def test_hot_pixels_above_the_full_ones_do_not_hide_them():
+    values = np.minimum(np.round(4000 * SCENE * LIGHT), 3700).astype(np.uint16)
+    for hot in (np.arange(3801, 3813).reshape(3, 4), 4095, 65535):
+        values[::100, ::100] = hot
+        assert saturation_level(RawImage(values, bit_depth=16)) == 3700
+
+
 def test_a_picture_without_full_pixels_has_none_and_given_bits_count():
     picture = raw(3000 * SCENE * LIGHT)
     assert saturation_level(picture) is None
