@@ -48,8 +48,10 @@ SHARPER = 2.7
 """How much more that is of lenslets that focus on the sensor, as of cameras 1.0, or have gaps: 2.4 to 3."""
 
 SLOW = 3.0, 5.0, 1.3
-"""Fresnel number p²/(λb) below which lenslets count as those; number and power of a further growth, as light of
-lenslets farther away arrives: of 27 cameras of numbers 0.5 to 9, 23 are within a factor 2 of it, all within 4.
+"""Fresnel number p²/(λb) below which lenslets count as those; number and power of a further growth.
+
+Light of lenslets farther away arrives then. Of 27 cameras of numbers 0.5 to 9, 23 are within a factor 2 of
+it, all within 4.
 """
 
 FOCUSED = 0.1
