@@ -46,6 +46,25 @@ def test_positions_in_names_say_at_which_end_the_numbers_begin(tmp_path, sign_y,
     assert found.aperture.pitch == pytest.approx((5.5, 4.0))
 
 
+def test_positions_whose_y_counts_up_are_read_as_the_pictures_show(tmp_path):
+    """Three rows of cameras above each other, whose pictures move up from one to the next."""
+    texture = np.random.default_rng(0).integers(0, 255, (60, 60), np.uint8)
+    for row in range(3):
+        for column in range(3):
+            name = f"out_{row:02}_{column:02}_{-5.0 * row:.6f}_{5.0 * column:.6f}.png"
+            lg.save(texture[2 * row : 2 * row + 50, 2 * column : 2 * column + 50], tmp_path / name)
+    with pytest.warns(SamplingWarning, match="the y in its names counts up"):
+        found = lg.open(tmp_path)
+    np.testing.assert_array_equal(found.data[0, 0], texture[4:54, 4:54])
+
+
+def test_views_counted_through_are_doubted_as_one_row(tmp_path):
+    for k in range(9):
+        lg.save(np.full((4, 5), k, np.uint8), tmp_path / f"bench2_{k:03}.png")
+    with pytest.warns(SamplingWarning, match="names 9 views of one row, 2. If they are 3 rows of as many"):
+        assert lg.open(tmp_path).data.shape[:2] == (1, 9)
+
+
 def test_two_pictures_of_one_view_are_refused(tmp_path):
     for name in ("view_00_00.png", "depth_00_00.png"):
         lg.save(np.ones((4, 5), np.uint8), tmp_path / name)
@@ -89,6 +108,32 @@ def test_a_hyperstack_keeps_its_axes(tmp_path):
     found = lg.open(tmp_path / "a.tif")
     assert (found.metadata["axes"], found.metadata["axes_sizes"]) == ("TZCYX", [2, 3, 4])
     np.testing.assert_array_equal(found.data.reshape(PLANES.shape), PLANES)
+
+
+def test_planes_of_other_shapes_are_read_as_they_are_meant_or_refused(tmp_path):
+    path, colour = tmp_path / "a.tif", VIEWS[0, 0]
+    tifffile.imwrite(path, colour, photometric="minisblack")  # eight pages, each three pixels wide
+    np.testing.assert_array_equal(lg.open(path).data, colour)
+    tifffile.imwrite(path, PLANES[0, 0], photometric="minisblack", volumetric=True, tile=(16, 16, 16))
+    with pytest.raises(FormatError, match="holds 4 planes in one page"):
+        lg.open(path)
+    with tifffile.TiffWriter(path) as file:  # a thumbnail before the picture
+        file.write(PLANES[0, 0, 0, ::2, ::2], subfiletype=1)
+        file.write(PLANES[0, 0, 0])
+    with pytest.raises(FormatError, match="page 1 has another size"):
+        lg.open(path)
+    np.testing.assert_array_equal(lg.open(path, page=1).data, PLANES[0, 0, 0])
+
+
+def test_arrays_whose_last_axis_counts_pictures_are_asked_for(tmp_path):
+    stack = np.arange(50 * 60 * 5).reshape(50, 60, 5)  # (y, x, n)
+    scipy.io.savemat(tmp_path / "a.mat", {"stack": stack})
+    with pytest.raises(
+        FormatError, match=r"axes='nyx' \(50 of 60 x 5 px\) or axes='yxn' \(5 of 50 x 60 px\)"
+    ):
+        lg.open(tmp_path / "a.mat")
+    assert [part.noun for part in lg.contents(tmp_path / "a.mat")] == ["array"]
+    np.testing.assert_array_equal(lg.open(tmp_path / "a.mat", axes="yxn").data[1], stack[..., 1])
 
 
 def test_planes_in_files_beside_are_read_or_named(tmp_path):

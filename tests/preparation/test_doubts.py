@@ -13,9 +13,9 @@ from lumigraph.core.raw import RawImage
 from lumigraph.core.saturation import saturation_level, with_bits
 from lumigraph.errors import CalibrationError, FormatError, SamplingWarning
 from lumigraph.io.cameras import from_cameras
+from lumigraph.io.view_order import check_order
 from lumigraph.preparation import doubts
 from lumigraph.preparation.beside import ReferenceImages
-from lumigraph.rendering import check_arrangement
 from lumigraph.simulation import simulate
 
 Y, X = np.mgrid[:300, :360]
@@ -32,6 +32,13 @@ def raw(values, seed=0):
 def test_full_pixels_are_seen_whatever_the_container(top, shift):
     values = np.minimum(np.round(1.6 * SCENE * LIGHT * top), top).astype(np.uint16) << shift
     assert saturation_level(RawImage(values, bit_depth=16)) == top << shift
+
+
+def test_hot_pixels_above_the_full_ones_do_not_hide_them():
+    values = np.minimum(np.round(4000 * SCENE * LIGHT), 3700).astype(np.uint16)
+    for hot in (np.arange(3801, 3813).reshape(3, 4), 4095, 65535):
+        values[::100, ::100] = hot
+        assert saturation_level(RawImage(values, bit_depth=16)) == 3700
 
 
 def test_a_picture_without_full_pixels_has_none_and_given_bits_count():
@@ -102,6 +109,7 @@ def test_an_offset_left_in_is_measured_and_none_is_where_there_is_none():
     [
         (lambda a: a, None), (lambda a: a[::-1, ::-1], None), (lambda a: a[:, ::-1], "columns mirrored"),
         (lambda a: a.swapaxes(0, 1), "rows and columns swapped"),
+        (lambda a: a[:2, 1::-1], "columns mirrored"),
     ],
 )  # fmt: skip
 def test_views_out_of_order_are_named(turned, told):
@@ -109,11 +117,12 @@ def test_views_out_of_order_are_named(turned, told):
     views = [
         [shift(texture, (-2 * r, -2 * c), order=1)[30:130, 30:130] for c in (-1, 0, 1)] for r in (-1, 0, 1)
     ]
-    views = from_cameras(turned(np.array(views)))
+    gains = 1 - 0.3 * np.random.default_rng(1).random((3, 3, 1, 1))  # vignetting
+    views = from_cameras(turned(gains * np.array(views)))
     if told is not None:
         with pytest.warns(SamplingWarning, match=f"times better with .*{told}"):
-            check_arrangement(views, "folder")
+            check_order(views, "folder")
         return
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_arrangement(views, "folder")
+        check_order(views, "folder")

@@ -72,7 +72,7 @@ class RawOptions:
         FormatError
             Something else, NaN, or views with something that only a raw image needs.
         """
-        from lumigraph import io, rendering
+        from lumigraph import io
         from lumigraph.core import checks
         from lumigraph.core.lightfield import LightField
         from lumigraph.core.raw import RawImage
@@ -87,7 +87,6 @@ class RawOptions:
         if not isinstance(found, LightField):
             raise FormatError(f"{path} holds a {called(found)} where views or a raw image are needed.")
         checks.finite_array(str(path), found.data, FormatError)
-        rendering.check_arrangement(found, str(path))
         if (self if one is None else replace(self, page=None)).is_given:
             raise FormatError(
                 f"{path} holds views, which need no --calibration, --white, --dark, --page or --bit-depth. "

@@ -62,9 +62,8 @@ def saturation_level(raw: RawImage[Any]) -> float | None:
     top = int(values.max())
     if bits is not None and (bits < container or raw.metadata.get(GIVEN)):
         return _declared(values, bits, container, top)
-    if bits is not None and top >= 2**bits - 1:
-        return float(2**bits - 1)
-    return float(top) if _is_full(values, container, top) else None
+    largest = bits is not None and top >= 2**bits - 1
+    return _full(values, container, top, largest=largest)
 
 
 def _declared(values: np.ndarray, bits: int, container: int, top: int) -> float:
@@ -80,16 +79,42 @@ def _zeros(values: np.ndarray) -> int:
     return (used & -used).bit_length() - 1 if used else 0
 
 
-def _is_full(values: np.ndarray, container: int, top: int) -> bool:
-    """True if `top`, the largest of whole-number values, is one that full pixels have."""
-    spare = _zeros(values)
+def _full(values: np.ndarray, container: int, top: int, *, largest: bool) -> float | None:
+    """Value of full pixels among whole numbers of which `top` is the largest; None where none are full."""
+    levels, counts = _levels(values)
+    if (heap := _heap(levels, counts)) is not None:
+        return heap
+    if largest:
+        return float(top)
+    spare, bits = _zeros(values), top.bit_length()
     if container > 8 and spare and top == 2**container - 2**spare:
-        return True
-    levels, counts = np.unique(values, return_counts=True)
-    bits = top.bit_length()
-    if container > 8 and top == 2**bits - 1 and bits >= 8:
-        return bits >= _FEWEST_BITS or counts[-1] > 1
-    if len(levels) < _LEAST_VALUES or counts[-1] < _HEAP:
-        return False
-    near = top - int(levels[-1 - _BELOW]) <= _NEAR * (top - int(levels[0]))
-    return bool(near and counts[-1] >= _TIMES * counts[-1 - _BELOW : -1].max())
+        return float(top)
+    whole = container > 8 and top == 2**bits - 1 and bits >= 8
+    return float(top) if whole and (bits >= _FEWEST_BITS or counts[-1] > 1) else None
+
+
+def _levels(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Different values in order, and how often each occurs."""
+    if values.dtype.kind != "u" or values.dtype.itemsize > 2:
+        return np.unique(values, return_counts=True)
+    most = 1 << (8 * values.dtype.itemsize)
+    counts = sum((np.bincount(row.ravel(), minlength=most) for row in _blocks(values)), np.zeros(most, int))
+    levels = np.flatnonzero(counts)
+    return levels, counts[levels]
+
+
+def _blocks(values: np.ndarray) -> list[np.ndarray]:
+    """Some rows each: counting makes eight bytes of every value."""
+    return np.array_split(values, max(1, values.size >> 22))
+
+
+def _heap(levels: np.ndarray, counts: np.ndarray) -> float | None:
+    """Level that occurs far more often than any below it and is the largest, but for a few hot pixels."""
+    above = counts[::-1].cumsum()[::-1] - counts
+    found = np.flatnonzero((counts >= _HEAP) & (counts >= _TIMES * above))
+    if len(levels) < _LEAST_VALUES or not len(found) or found[-1] < _BELOW:
+        return None
+    k = found[-1]
+    level, below = int(levels[k]), int(levels[k - _BELOW])
+    near = level - below <= _NEAR * (level - int(levels[0]))
+    return float(level) if near and counts[k] >= _TIMES * counts[k - _BELOW : k].max() else None

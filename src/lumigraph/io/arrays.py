@@ -21,6 +21,12 @@ _COLOURS = (3, 4)
 _KNOWN = frozenset({"yx", "yxc", "nyx", "nyxc", "vuyx", "vuyxc"})
 """Axes of a picture, of a stack of n, and of views by rows and columns."""
 
+_OTHERS = ("cxyuv", "yxvuc", "vucyx", "xyuv", "yxvu", "yxn", "yxcn")
+"""Orders of others, which are asked for."""
+
+_NARROW = 8
+"""Times as many pictures or rows as columns that show that the last axis counts pictures."""
+
 
 def arrangement(
     what: str,
@@ -53,16 +59,16 @@ def arrangement(
     if axes is not None:
         return _given(what, shape, axes)
     forward, backward = _letters(shape, weighted=weighted), _letters(shape[::-1], weighted=weighted)[::-1]
-    if reverse is not None:
-        return backward if reverse else forward
-    fits = [_fits(forward, shape), _fits(backward, shape)]
-    if len(shape) == 3 and shape[0] in _COLOURS and shape[2] not in _COLOURS:
+    natural, other = (backward, forward) if reverse else (forward, backward)
+    if reverse is None and len(shape) == 3 and shape[0] in _COLOURS and shape[2] not in _COLOURS:
         raise _question(what, shape, "nyx", "cxy")
-    if fits == [False, True] and len(shape) == 5:
+    if reverse is None and len(shape) == 5 and not _fits(forward, shape) and _fits(backward, shape):
         return backward
-    if not fits[0]:
-        raise _question(what, shape, forward, backward)
-    return forward
+    if not _fits(natural, shape):
+        step = -1 if reverse else 1
+        found = [one[::step] for one in _OTHERS if len(one) == len(shape) and _fits(one[::step], shape)]
+        raise _question(what, shape, *dict.fromkeys([natural, *(found or [other])]))
+    return natural
 
 
 def _given(what: str, shape: tuple[int, ...], axes: str) -> str:
@@ -81,8 +87,13 @@ def _letters(shape: tuple[int, ...], *, weighted: bool) -> str:
 
 
 def _fits(axes: str, shape: tuple[int, ...]) -> bool:
-    """True if pictures are at least as wide as there are views in a row, in at most four colours."""
+    """True if pictures are at least as wide as there are views in a row, in at most four colours.
+
+    Pictures of a stack may be fewer or more, but hardly slits.
+    """
     size = dict(zip(axes, shape, strict=True))
+    if "n" in axes and size["x"] * _NARROW < min(size["n"], size["y"]):
+        return False
     few = max(size.get("v", 1), size.get("u", 1)) <= min(size["y"], size["x"])
     return few and size.get("c", 1) <= max(_COLOURS)
 
@@ -90,8 +101,8 @@ def _fits(axes: str, shape: tuple[int, ...]) -> bool:
 def _question(what: str, shape: tuple[int, ...], *choices: str) -> FormatError:
     told = " or ".join(f"axes={one!r} ({_meaning(one, shape)})" for one in choices)
     return FormatError(
-        f"{what} is {_times(shape)}, which may be one thing in this order and another in MATLAB's reverse "
-        f"order. Give {told}."
+        f"{what} is {_times(shape)}, and which axis is which is not known: MATLAB stores them in reverse. "
+        f"Give {told}."
     )
 
 

@@ -52,14 +52,17 @@ def contents(path: Path) -> list[tuple[str, str, str]]:
         return hdf5.contents(path)
     with source.decoding(path, "a MATLAB file"):
         return [
-            (
-                each.name,
-                arrays.noun_of(arrays.arrangement("", each.shape, reverse=False, weighted=True)),
-                f"{_times(each.shape)}, {each.kind}",
-            )
+            (each.name, _noun(each), f"{_times(each.shape)}, {each.kind}")
             for each in mat5.variables(path)
             if _is_read(each)
         ]
+
+
+def _noun(variable: mat5.Variable) -> str:
+    try:
+        return arrays.noun_of(arrays.arrangement("", variable.shape, reverse=False, weighted=True))
+    except FormatError:
+        return "array"
 
 
 def _is_hdf5(path: Path) -> bool:

@@ -29,6 +29,7 @@ _TYPES = frozenset(f"{kind}{bits}" for kind in ("uint", "int") for bits in (8, 1
     "float32",
     "float64",
 }
+_COLOURS = (3, 4)
 _FIRST = 8  # byte at which pixels can begin at the earliest
 # tifffile logs what it finds odd; whoever wants that adds a handler, others get our one-line errors.
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
@@ -135,7 +136,7 @@ def count(path: Path) -> int:
         planes, told = _said(path, file, None)
         with opened(path, file, planes, told) as reader:
             found = reader.count
-            return found if found > 1 and reader.page(1)[1].shape == reader.page(0)[1].shape else 1
+            return found if found > 1 and not _has_thumbnails(reader.page(0)[1], reader.page(1)[1]) else 1
 
 
 def _single(reader: PlaneReader, k: int, max_pixels: int) -> RawImage:
@@ -143,7 +144,7 @@ def _single(reader: PlaneReader, k: int, max_pixels: int) -> RawImage:
     _check_page(path, image, max_pixels)
     found = header.loads(image.description)
     data = reader.pixels(k, transparent=found is not None)
-    depth = image.bitspersample if data.dtype.kind in "iu" else None
+    depth = _depth(image, data)
     if found is not None and "shape" in found and data.size == np.prod(found["shape"]):
         data = data.reshape(found["shape"])
     return header.restore(data, found, depth)
@@ -155,7 +156,7 @@ def _pages(
     path, first = reader.page(0)
     count = reader.count
     _check_page(path, first, max_pixels)
-    if count > 1 and reader.page(1)[1].shape != first.shape:  # a picture and its thumbnails
+    if count > 1 and _has_thumbnails(first, reader.page(1)[1]):
         return _single(reader, 0, max_pixels)
     channels = (first.samplesperpixel,) if first.samplesperpixel > 1 else ()
     source.check_size(path, (count * first.imagelength, first.imagewidth, *channels), max_pixels)
@@ -172,6 +173,12 @@ def _pages(
         data[k] = plane
     assert data is not None  # count is at least 1
     return _noun(data, planes, told, first)
+
+
+def _has_thumbnails(first: tifffile.TiffPage, second: tifffile.TiffPage) -> bool:
+    """True if the first page is the picture and the others are small ones of it."""
+    small = second.imagelength < first.imagelength and second.imagewidth < first.imagewidth
+    return not first.is_reduced and (small or (second.is_reduced and second.shape != first.shape))
 
 
 def _of_stack(page: RawImage, planes: ome.OmePlanes | None, told: Declared | None, count: int) -> RawImage:
@@ -201,7 +208,15 @@ def _noun(
         dz, dy, dx = (value or 1.0 for value in pitches)
         depths = depths or tuple((np.arange(len(data)) - len(data) // 2) * dz)
         return Volume(data, Grid(data.shape[1:3], (dy, dx)), depths)
-    depth = _bits(planes, first.bitspersample) if data.dtype.kind in "iu" else None
+    if told is not None and told.writer == "tifffile" and data.shape[-1] in _COLOURS and data.ndim < 5:
+        # Planes three pixels wide are the rows of pictures whose colours come last.
+        data = data.reshape(*told.sizes, *data.shape[1:])
+        return (
+            RawImage(data, bit_depth=_depth(first, data))
+            if data.ndim == 3
+            else Stack(data, bit_depth=_depth(first, data))
+        )
+    depth = _bits(planes, _depth(first, data))
     axes = _along(planes, told, len(data))
     quantity = "dz [m]" if depths else f"page ({axes})" if axes else "page"
     return Stack(data, depths, quantity, _pitch(planes, told), depth, _about(planes, told))
@@ -216,6 +231,14 @@ def _pitch(planes: ome.OmePlanes | None, told: Declared | None) -> float | None:
 def _bits(planes: ome.OmePlanes | None, stored: int | None) -> int | None:
     bits = None if planes is None else planes.bits
     return stored if bits is None or stored is None else min(bits, stored)
+
+
+def _depth(image: tifffile.TiffPage, data: np.ndarray) -> int | None:
+    """Bits of the numbers that a page became; those of the file unless they were drawn by a palette."""
+    if data.dtype.kind not in "iu":
+        return None
+    drawn = image.photometric == tifffile.PHOTOMETRIC.PALETTE or image.bitspersample == 1
+    return 8 * data.dtype.itemsize if drawn else image.bitspersample
 
 
 def _along(planes: ome.OmePlanes | None, told: Declared | None, count: int) -> str:
@@ -250,6 +273,8 @@ def _is_volume(planes: ome.OmePlanes | None, told: Declared | None, count: int) 
 
 def _check_page(path: Path, image: tifffile.TiffPage, max_pixels: int) -> None:
     """Refuse what would be large, cut short or undecodable, before it is decoded."""
+    if image.imagedepth > 1:
+        raise FormatError(f"{path} holds {image.imagedepth} planes in one page. Save one page for each.")
     if len(image.shape) not in (2, 3) or image.bitspersample < 1:
         raise FormatError(f"{path} holds data of shape {image.shape}, not a picture (y, x) or (y, x, c).")
     channels = (image.samplesperpixel,) if image.samplesperpixel > 1 else ()

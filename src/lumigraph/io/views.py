@@ -23,7 +23,7 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.lightfield import LightField
 from lumigraph.core.raw import RawImage
 from lumigraph.errors import FormatError, SamplingWarning
-from lumigraph.io import bmp, header, jpeg, png, pnm, source, target, tiff
+from lumigraph.io import bmp, header, jpeg, png, pnm, source, target, tiff, view_order
 from lumigraph.io.cameras import from_cameras, in_order_of_views, to_cameras
 
 _LOADERS = {
@@ -55,7 +55,8 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> LightField:
     SamplingWarning
         Views are missing, as of a star or a cross: they are black and not `valid`.
     """
-    files, spacing = _files(path)
+    files, places = _files(path)
+    spacing = places or (1.0, 1.0)
     rows, columns = (max(place[k] for place in files) + 1 for k in (0, 1))
     if rows * columns > _MOST:
         raise FormatError(
@@ -79,7 +80,8 @@ def load(path: Path, *, max_pixels: int = source.MAX_PIXELS) -> LightField:
     assert data is not None  # _files found at least one
     there = np.zeros((rows, columns), bool)
     there[tuple(np.transpose(list(files)))] = True
-    return _without(path, _restored(path, data, spacing), there, spacing)
+    views = _without(path, _restored(path, data, spacing), there, spacing)
+    return views if places is None else _upward(path, views)
 
 
 def _room(path: Path, shape: tuple[int, ...], dtype: np.dtype, held: int, max_pixels: int) -> np.ndarray:
@@ -89,6 +91,17 @@ def _room(path: Path, shape: tuple[int, ...], dtype: np.dtype, held: int, max_pi
     needed = float(np.prod(shape, dtype=float)) * dtype.itemsize
     memory.require(needed, f"{path}: its views", "Use fewer or smaller ones.", FormatError)
     return np.zeros(shape, dtype)
+
+
+def _upward(path: Path, views: LightField) -> LightField:
+    """The light field with its rows turned round where the y in its names counts up, as the pictures show."""
+    if not view_order.is_mirrored(views):
+        return views
+    _doubt(f"{path}: the y in its names counts up, as the pictures show; read so")
+    last = len(views.data) - 1
+    for k in range((last + 1) // 2):  # row by row: all at once would take as much memory again
+        views.data[[k, last - k]] = views.data[[last - k, k]]
+    return views if views.valid is None else replace(views, valid=views.valid[::-1])
 
 
 def _without(path: Path, views: LightField, there: np.ndarray, spacing: tuple[float, float]) -> LightField:
@@ -188,8 +201,8 @@ def contents(path: Path) -> list[tuple[str, str, str]]:
     return [("", "LightField", f"{some}{rows} x {columns} views{told}")]
 
 
-def _files(path: Path) -> tuple[Files, tuple[float, float]]:
-    """Picture of each camera (row, column), and the spacing of the cameras (down, right)."""
+def _files(path: Path) -> tuple[Files, tuple[float, float] | None]:
+    """Picture of each camera (row, column), and the spacing of the cameras (down, right), where names say."""
     path = source.existing(path)
     if not path.is_dir():
         raise FormatError(f"{path} is not a folder of views, and has no extension that says what it is.")
@@ -197,16 +210,22 @@ def _files(path: Path) -> tuple[Files, tuple[float, float]]:
     if len(names) > 10 * _MOST:
         raise FormatError(f"{path} holds {len(names)} files, too many for views. Check the path.")
     if found := {m: path / m[0] for m in map(_HCI.fullmatch, names) if m}:
-        return _hci(path, found), (1.0, 1.0)
+        return _hci(path, found), None
     if found := [m for m in map(_STANFORD.fullmatch, names) if m]:
         return _stanford(path, found)
-    placed = _placed(path, [m for m in map(_PLACED.fullmatch, names) if m])
+    counted = [m for m in map(_PLACED.fullmatch, names) if m]
+    placed = _placed(path, counted)
     if not placed or len(placed) > _MOST:
         raise FormatError(
             f"{path} holds no views: names such as input_Cam000.png, out_00_00_Y_X_.png or view_00_00.png."
         )
     first = min(place[0] for place in placed), min(place[1] for place in placed)
-    return {(r - first[0], c - first[1]): file for (r, c), file in placed.items()}, (1.0, 1.0)
+    if _may_be_square(counted):
+        _doubt(
+            f"{path} names {len(placed)} views of one row, {first[0]}. If they are {math.isqrt(len(placed))} "
+            "rows of as many, number them input_Cam000.png, row by row"
+        )
+    return {(r - first[0], c - first[1]): file for (r, c), file in placed.items()}, None
 
 
 def _placed(path: Path, found: list[re.Match[str]]) -> Files:
@@ -221,6 +240,16 @@ def _placed(path: Path, found: list[re.Match[str]]) -> Files:
             )
         files[place] = path / match[0]
     return files
+
+
+def _may_be_square(counted: list[re.Match[str]]) -> bool:
+    """True if numbers count a square's views, and the one before them hardly a row: it has other digits."""
+    few = len(counted) < 9 or math.isqrt(len(counted)) ** 2 != len(counted)
+    return (
+        not few
+        and len({m[1] for m in counted}) == 1
+        and (int(counted[0][1]) > 1 or any(len(m[1]) != len(m[2]) for m in counted))
+    )
 
 
 def _hci(path: Path, found: dict[re.Match[str], Path]) -> Files:
@@ -264,7 +293,8 @@ def _stanford(path: Path, found: list[re.Match[str]]) -> tuple[Files, tuple[floa
             f"{path}: {far} of {len(found)} views stand over half a spacing from where their numbers say, by "
             "the positions in their names. They are read by their numbers"
         )
-    return files, (float(spacing[0]) or 1.0, float(spacing[1]) or 1.0)
+    down, right = (float(step) for step in spacing)
+    return files, (down or abs(right) or 1.0, right or abs(down) or 1.0)
 
 
 def _slopes(numbers: np.ndarray, places: np.ndarray) -> np.ndarray:

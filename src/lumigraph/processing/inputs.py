@@ -22,7 +22,6 @@ from lumigraph.preparation import prepare, read_calibration, sharp_kinds
 from lumigraph.preparation.given import read_raw
 from lumigraph.processing.napari_lf import FILE, settings_beside
 from lumigraph.processing.recognise import Guess
-from lumigraph.rendering import check_arrangement
 
 Source = str | PathLike[str] | RawImage | Array
 """A file, or the raw image in it."""
@@ -156,8 +155,6 @@ def read(
             raise FormatError(f"{path} holds a {called(found)} where a raw image or views are needed.")
         found = RawImage(found)  # type: ignore[arg-type] - checked by RawImage
     checks.finite_array("raw image" if path is None else str(path), found.data, FormatError)
-    if isinstance(found, LightField):
-        check_arrangement(found, "views" if path is None else str(path))
     described = camera if camera is None or isinstance(camera, Instrument) else load_camera(camera)
     maker = None if calibration is None else Path(calibration)
     known = Inputs(

@@ -3,7 +3,6 @@
 - `decode`, `encode`: plenoptic 1.0 raw images to a `LightField` on their lattice, and back; `squared`,
   `pixels`, `kind_check`: hexagonal lattices onto a square grid, hot pixels, raw images of a camera 2.0
 - `views`, `paths`: views, points of view, apertures, mosaics; a point of view that moves
-- `arrangement`: views whose numbers do not say where they stand
 - `refocus`, `fourier_slice`, `sharp`, `focus_range`, `detail`: refocused pictures; one that is focused
   everywhere; how finely they are sampled
 - `low_pass`: a picture without the seams of its patches
@@ -11,7 +10,6 @@
 - `geometry`, `interpolate`: lengths in metres, rectangles of lenslets; values between samples
 """
 
-from lumigraph.rendering.arrangement import check_arrangement
 from lumigraph.rendering.decode import decode
 from lumigraph.rendering.detail import detail, finer
 from lumigraph.rendering.encode import encode
@@ -36,7 +34,6 @@ from lumigraph.rendering.views import (
 __all__ = [
     "all_in_focus",
     "arranged",
-    "check_arrangement",
     "decode",
     "detail",
     "encode",

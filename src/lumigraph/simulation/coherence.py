@@ -6,7 +6,7 @@ intensities on the sensor are added, each with a weight.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -24,6 +24,9 @@ Seed = int | np.random.Generator | None
 
 BLOCKS = 8
 """Blocks of shots, whose spread shows the error: two show one difference, which by chance may be small."""
+
+_COARSER, _COARSEST = 8.0, 0.9
+"""Times the accuracy of fewer modes, which show how far an image is off, and the largest accuracy of them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -338,8 +341,8 @@ class PartiallyCoherent:
         `GaussianSchell` or `ExtendedSource`; or `CoherentModes` of the camera's wavelength, with a sample
         wherever a slice has one, in the focused plane.
     accuracy
-        Error of a source's mutual intensity, over the largest intensity; `CoherentModes` have their own. Its
-        share is part of ``metadata["error"]``.
+        Error of a source's mutual intensity, over the largest intensity; `CoherentModes` have their own. What
+        it does to the image is found beside an image of fewer modes, as part of ``metadata["error"]``.
 
     Raises
     ------
@@ -385,3 +388,22 @@ class PartiallyCoherent:
                 f"{known.shape[0]} x {known.shape[1]}. Give modes on a larger grid."
             )
         return self.source.through(lambda field: propagate(field, -dz, grid=grid))
+
+    def fewer(self, modes: CoherentModes, grid: Grid, dz: float) -> CoherentModes | None:
+        """Fewer modes on a plane, of twice the error or more, to judge others by; None where there are none.
+
+        Parameters
+        ----------
+        modes
+            Those of `on`.
+        grid, dz
+            The plane.
+        """
+        accuracy = self.accuracy
+        judged = isinstance(self.source, CoherentModes) or modes.count == 1
+        while not judged and accuracy < _COARSEST:
+            accuracy = min(_COARSER * accuracy, _COARSEST)
+            found = replace(self, accuracy=accuracy).on(grid, dz, modes.wavelengths[0])
+            if found.count < modes.count and found.error > 2 * modes.error:
+                return found
+        return None

@@ -1,12 +1,13 @@
 """Parts of a scene whose images need no shots: points, evenly lit stops, slices in light of one kind."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from lumigraph.core import arrays
-from lumigraph.core.progress import Progress, Stage
+from lumigraph.core.modes import CoherentModes
+from lumigraph.core.progress import Needs, Progress, Stage
 from lumigraph.core.progress import part as share
 from lumigraph.operators import CameraOptics, SingleLensOperator, single_lens, single_lens_operator
 from lumigraph.operators.lenslets import points
@@ -113,13 +114,52 @@ def _lit(
     """Image of a slice in coherent or partially coherent light (ny, nx), and its error."""
     reached = error.of_quadrature("coherent", accuracy).through(camera)
     amplitude = np.sqrt(arrays.to_numpy(part.intensity))
-    if isinstance(light, PartiallyCoherent):
-        progress(Stage(0.0, "modes of the source"))
-        modes = light.on(part.grid, part.dz, camera.wavelength)
-        data = np.concatenate([arrays.to_numpy(field.data) for field in modes.fields])
-        reached = reached.and_also(modes.error, f", {modes.count} modes to {modes.error:.2g}")
-        amplitude = amplitude.astype(np.float32) * data
-    return coherent_image(camera, amplitude, part.grid, part.dz, accuracy, progress), reached
+    if not isinstance(light, PartiallyCoherent):
+        return coherent_image(camera, amplitude, part.grid, part.dz, accuracy, progress), reached
+    progress(Stage(0.0, "modes of the source"))
+    modes = light.on(part.grid, part.dz, camera.wavelength)
+    fewer = light.fewer(modes, part.grid, part.dz)
+
+    def image(chosen: np.ndarray, told: Progress) -> np.ndarray:
+        lit = amplitude.astype(np.float32) * chosen
+        return coherent_image(camera, lit, part.grid, part.dz, accuracy, told)
+
+    data = _stacked(modes)
+    if fewer is None:
+        whole, off = image(data, progress), modes.error
+    else:
+        whole, off = _beside_fewer(image, data, _stacked(fewer), progress)
+        off *= modes.error / (fewer.error - modes.error)
+    return whole, reached.and_also(off, f", {modes.count} modes to {modes.error:.2g}").and_also(
+        error.ROUNDING
+    )
+
+
+def _stacked(modes: CoherentModes) -> np.ndarray:
+    return np.concatenate([arrays.to_numpy(field.data) for field in modes.fields])
+
+
+def _beside_fewer(
+    image: Callable[[np.ndarray, Progress], np.ndarray],
+    modes: np.ndarray,
+    fewer: np.ndarray,
+    progress: Progress,
+) -> tuple[np.ndarray, float]:
+    """Image of all modes, and its relative rms difference from that of fewer modes.
+
+    Fewer modes that are the first of all are imaged once.
+    """
+
+    def again(stage: float) -> None:
+        """What is needed is told once."""
+        if not isinstance(stage, Needs):
+            share(progress, 1, 2)(stage)
+
+    first = np.array_equal(modes[: len(fewer)], fewer)
+    other = image(modes[len(fewer) :] if first else modes, share(progress, 0, 2))
+    coarse = image(fewer, again)
+    whole = coarse + other if first else other
+    return whole, error.norm(whole - coarse) / (error.norm(whole) or 1.0)
 
 
 def _without_lenslets(

@@ -157,9 +157,6 @@ def open_exhibit(path: Path, origin: Origin | None = None, progress: Progress | 
         )
     match found:
         case LightField():
-            from lumigraph.rendering import check_arrangement
-
-            check_arrangement(found, path.name)
             return of_views(path.name, found)
         case Stack():
             return of_stack(path.name, found)

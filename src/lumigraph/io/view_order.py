@@ -1,4 +1,4 @@
-"""Check that the views of a light field stand where their numbers say: `check_arrangement`."""
+"""Check that the views of a light field stand where their numbers say: `check_order`, `is_mirrored`."""
 
 import math
 import warnings
@@ -11,17 +11,21 @@ from lumigraph.core.arrays import to_numpy
 from lumigraph.core.lightfield import LightField
 from lumigraph.errors import SamplingWarning
 
-_SIDE, _REACH, _WINDOW = 128, 20, 7
+_SIDE, _REACH, _WINDOW, _SMOOTH = 128, 20, 7, 7
 """Pixels across the pictures that are compared, how far they may be shifted, over what they agree [px]."""
+
+_FLAT, _FEWEST = 1e-4, 4
+"""Detail, as a share of the largest value, below which a picture has none; fewest pictures."""
 
 _BETTER, _SEEN, _MOST = 1.5, 0.02, 99
 """How many times better the views must agree otherwise; the least difference that counts, as a share of the
 picture's contrast; the largest number of times that is said."""
 
 Around = dict[tuple[int, int], np.ndarray]
+_GIVEN, _MIRRORED = "as they are", "with the columns mirrored"
 _ORDERS = {
-    "as they are": (1, 1, False),
-    "with the columns mirrored": (1, -1, False),
+    _GIVEN: (1, 1, False),
+    _MIRRORED: (1, -1, False),
     "with rows and columns swapped": (1, 1, True),
     "with rows and columns swapped and the columns mirrored": (1, -1, True),
 }
@@ -29,7 +33,7 @@ _ORDERS = {
 changes near and far but not how well they agree."""
 
 
-def check_arrangement(views: LightField[Any], name: str) -> None:
+def check_order(views: LightField[Any], name: str) -> None:
     """Warn where views agree far better with their two numbers swapped, or with one of them mirrored.
 
     Parameters
@@ -44,21 +48,33 @@ def check_arrangement(views: LightField[Any], name: str) -> None:
     SamplingWarning
         Which order makes them agree, and how well they do in both.
     """
-    found = [_compared(views, wide) for wide in (True, False)]
-    for costs in found:
-        if costs is None:
+    if (better := _better(views)) is None:
+        return
+    order, best, given = better
+    warnings.warn(
+        f"{name}: the views agree {given / max(best, given / _MOST):.1f} times better {order} "
+        f"(they differ by {best:.1%} of the contrast, as they are by {given:.1%}). "
+        "Pictures focused from them are blurred: check which number in the names is the row.",
+        SamplingWarning,
+        stacklevel=4,
+    )
+
+
+def is_mirrored(views: LightField[Any]) -> bool:
+    """True if views agree far better with the columns, or as well the rows, in reverse order."""
+    better = _better(views)
+    return better is not None and better[0] == _MIRRORED
+
+
+def _better(views: LightField[Any]) -> tuple[str, float, float] | None:
+    """Order in which views agree far better, and their difference in it and as they are; None if in none."""
+    for wide in (True, False):
+        if (costs := _compared(views, wide)) is None:
             continue
-        best = min(costs, key=lambda order: costs[order])
-        given = costs["as they are"]
+        best, given = min(costs, key=lambda order: costs[order]), costs[_GIVEN]
         if costs[best] * _BETTER < given and given > _SEEN:
-            warnings.warn(
-                f"{name}: the views agree {given / max(costs[best], given / _MOST):.1f} times better {best} "
-                f"(they differ by {costs[best]:.1%} of the contrast, as they are by {given:.1%}). "
-                "Pictures focused from them are blurred: check which number in the names is the row.",
-                SamplingWarning,
-                stacklevel=3,
-            )
-            return
+            return best, costs[best], given
+    return None
 
 
 def _compared(views: LightField[Any], wide: bool) -> dict[str, float] | None:
@@ -89,8 +105,8 @@ def _compared(views: LightField[Any], wide: bool) -> dict[str, float] | None:
 def _pictures(views: LightField[Any], wide: bool) -> tuple[np.ndarray, Around, float] | None:
     """Middle view, the eight around it at the same distance, and rows a slope moves for each column."""
     nv, nu, ny, nx = (int(n) for n in views.data.shape[:4])
-    far = min(nv, nu) // 2 if min(nv, nu) % 2 else min(nv, nu) // 2 - 1
-    if far < 1 or min(ny, nx) < 3 * _WINDOW:
+    far = max((min(nv, nu) - 1) // 2, 1)
+    if min(nv, nu) < 2 or min(ny, nx) < 3 * _WINDOW:
         return None
     step = math.ceil(max(ny, nx) / _SIDE) if wide else 1
     if not wide and max(ny, nx) <= _SIDE:
@@ -102,13 +118,15 @@ def _pictures(views: LightField[Any], wide: bool) -> tuple[np.ndarray, Around, f
         for u in (-1, 0, 1)
         if _is_there(views, middle[0] + far * v, middle[1] + far * u)
     }
-    if (0, 0) not in read or len(read) < 6:
+    if (0, 0) not in read or len(read) < _FEWEST or not all(any(place[k] for place in read) for k in (0, 1)):
         return None
     down, right = (a / b for a, b in zip(views.aperture.pitch, views.lenslets.pitch, strict=True))
     return read.pop((0, 0)), read, down / right
 
 
 def _is_there(views: LightField[Any], v: int, u: int) -> bool:
+    if not (0 <= v < views.data.shape[0] and 0 <= u < views.data.shape[1]):
+        return False
     return views.valid is None or bool(np.asarray(to_numpy(views.valid[v, u])).any())
 
 
@@ -118,9 +136,16 @@ def _reduced(view: np.ndarray, step: int) -> np.ndarray:
     grey = grey if grey.ndim == 2 else grey.mean(-1)
     if step == 1:
         top, left = ((n - _SIDE) // 2 if n > _SIDE else 0 for n in grey.shape)
-        return grey[top : top + _SIDE, left : left + _SIDE]
+        return _detail(grey[top : top + _SIDE, left : left + _SIDE])
     ny, nx = (n // step for n in grey.shape)
-    return grey[: ny * step, : nx * step].reshape(ny, step, nx, step).mean((1, 3))
+    return _detail(grey[: ny * step, : nx * step].reshape(ny, step, nx, step).mean((1, 3)))
+
+
+def _detail(grey: np.ndarray) -> np.ndarray:
+    """What a picture shows without its brightness, which vignetting changes from view to view."""
+    fine = grey - ndimage.gaussian_filter(grey, _SMOOTH)
+    least = _FLAT * float(np.abs(grey).max())
+    return fine / spread if (spread := float(fine.std())) > least else np.zeros_like(fine)
 
 
 def _moved(view: np.ndarray, y: float, x: float) -> np.ndarray:
