@@ -77,18 +77,23 @@ def _figures(block: Any, variables: dict[str, Any], gallery: dict[str, Any]) -> 
     """Save the figures and the films (paths that end in .gif) that a block of an example has made."""
     from sphinx_gallery.scrapers import figure_rst
 
-    found, known = [], gallery.setdefault("_figures", set())
+    source, saved = gallery.get("_saved", ("", []))
+    if source != variables["src_file"]:  # things, not their `id`: that of a figure may be a later one's again
+        saved = []
+    gallery["_saved"] = variables["src_file"], saved
+    found = []
     for thing in variables["example_globals"].values():
-        if isinstance(thing, Figure) and id(thing) not in known:
-            known.add(id(thing))
-            path = Path(next(variables["image_path_iterator"]))
-            thing.savefig(path, dpi=110)
-            found.append(str(path))
-        elif isinstance(thing, Path) and thing.suffix == ".gif" and thing not in known:
-            known.add(thing)
-            path = Path(next(variables["image_path_iterator"])).with_suffix(".gif")
+        film = isinstance(thing, Path) and thing.suffix == ".gif"
+        if not (film or isinstance(thing, Figure)) or any(thing is one for one in saved):
+            continue
+        saved.append(thing)
+        path = Path(next(variables["image_path_iterator"]))
+        if film:
+            path = path.with_suffix(".gif")
             shutil.copy(thing, path)
-            found.append(str(path))
+        else:
+            thing.savefig(path, dpi=110)
+        found.append(str(path))
     return figure_rst(found, gallery["src_dir"])
 
 
@@ -106,6 +111,7 @@ def _every_name_has_a_page(app: Any, error: Exception | None) -> None:
 
 def setup(app: Any) -> None:
     """Sphinx calls this."""
+    app.extensions["sphinx-mathjax-offline"].parallel_read_safe = True  # it copies files at the end
     app.connect("build-finished", _every_name_has_a_page)
     app.add_directive("verbs", _Verbs)
 
@@ -134,6 +140,7 @@ sphinx_gallery_conf = {
     "within_subsection_order": "FileNameSortKey",
     "reset_modules": (),
     "abort_on_example_error": True,
+    "parallel": True,  # as many as Sphinx's own processes (-j)
     "only_warn_on_example_error": False,
     "download_all_examples": False,
     "remove_config_comments": True,
