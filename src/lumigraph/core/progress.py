@@ -39,21 +39,23 @@ class Needs(Stage):
 def expected(progress: Progress, least: float) -> Progress:
     """Callback that says once, as soon as it can be foreseen, what a computation takes, if `least` seconds or more.
 
-    >>> from itertools import count
     >>> told = expected(lambda fraction: print(what_of(fraction)), 0.0)
-    >>> told(0.0), told(0.5)  # doctest: +ELLIPSIS
+    >>> told(0.1), told(0.4)  # doctest: +ELLIPSIS
     <BLANKLINE>
     about ... s
     ...
     """
-    began, said = time.monotonic(), False
+    first: tuple[float, float] | None = None  # what comes before the first step is done once
+    said = False
 
     def tell(fraction: float) -> None:
-        nonlocal said
-        passed = time.monotonic() - began
-        if not said and fraction >= _FORESEEN and passed >= least * _FORESEEN:
-            said, whole = True, passed / fraction
-            if whole >= least:
+        nonlocal first, said
+        now = time.monotonic()
+        if first is None and fraction > 0:
+            first = fraction, now
+        elif first is not None and not said and _FORESEEN <= fraction - first[0] < 0.5:
+            whole = (now - first[1]) / (fraction - first[0])
+            if said := whole >= least:
                 told = ": ".join(filter(None, (what_of(fraction), f"about {whole:.0f} s")))
                 progress(Needs(fraction, told))
                 return

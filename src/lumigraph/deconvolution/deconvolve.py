@@ -356,10 +356,11 @@ class Deconvolver:
         key = fingerprint(exposure, str(data.dtype), str(arrays.placement(data)))
         if self._scale is None or self._scale[0] != key:
             _require(self._wide, data)
-            began, forward = time.perf_counter(), self.method.start is None
             scale = Scale.of(self._wide, exposure, data, least_seen(self.operator))
-            self._scale = key, scale.begun() if forward else scale
-            self._pace = (time.perf_counter() - began) * (1 if forward else 2)  # A and its transpose
+            began = time.perf_counter()  # the operator has what it makes at its first use
+            even = scale.begun()
+            self._pace = 2 * (time.perf_counter() - began)  # A and its transpose
+            self._scale = key, scale if self.method.start is not None else even
             if looks_beyond(self.operator):
                 self._pictured = scale.pictured(BESIDE)
         return self._scale[1]
