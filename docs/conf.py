@@ -103,7 +103,8 @@ def _every_name_has_a_page(app: Any, error: Exception | None) -> None:
         return
     there = app.env.get_domain("py").objects
     modules = [name for name, entry in there.items() if entry.objtype == "module"]
-    wanted = [f"lumigraph.{name}" for name in lumigraph.__all__ if name != "targets"]
+    public = {name: getattr(lumigraph, name) for name in lumigraph.__all__ if name != "targets"}
+    wanted = [one.__name__ if ismodule(one) else f"lumigraph.{name}" for name, one in public.items()]
     wanted += [f"{module}.{name}" for module in modules for name in _own(module)]
     if missing := [name for name in wanted if name not in there]:
         raise ExtensionError(f"no page of the site has {', '.join(sorted(missing))}.")
