@@ -1,6 +1,7 @@
 """The site: `make docs` builds it into site/, strictly and without a network."""
 
 import shutil
+import sys
 from importlib import import_module
 from importlib.metadata import version as _version
 from inspect import ismodule
@@ -13,6 +14,9 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
+
+sys.path.insert(0, str(Path(__file__).parent))
+import accessible
 
 import lumigraph
 from lumigraph.cli.app import VERBS
@@ -114,6 +118,7 @@ def setup(app: Any) -> None:
     """Sphinx calls this."""
     app.extensions["sphinx-mathjax-offline"].parallel_read_safe = True  # it copies files at the end
     app.connect("build-finished", _every_name_has_a_page)
+    app.connect("build-finished", accessible.finish)
     app.add_directive("verbs", _Verbs)
 
 

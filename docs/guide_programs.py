@@ -1,11 +1,12 @@
 """Pictures of guides that short programs make, in docs/_static/guides.
 
-Run: python docs/guide_programs.py [NAME ...], with names of the functions in `PICTURES` (some minutes for all).
+Run: python docs/guide_programs.py [NAME ...], with names of the functions in `PICTURES`: some minutes.
 """
 
 import io
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -69,7 +70,10 @@ def single() -> None:
     )
     own = {41: {"focal_change": 0.3}, 32: {"offset_y": "5 um"}}
     changed = plain.replace(lenslets={"single": own})
-    pictures = [(root(point_of(one, 3 * mm)), what) for one, what in ((plain, "all alike"), (changed, "41 stronger, 32 aside"))]
+    pictures = [
+        (root(point_of(one, 3 * mm)), what)
+        for one, what in ((plain, "all alike"), (changed, "41 stronger, 32 aside"))
+    ]
     size = 260
     row([(middle(image, size), title) for image, title in pictures], "single-point")
     changes([(middle(pictures[1][0] - pictures[0][0], size), "what changes")], "single-change")
@@ -82,7 +86,9 @@ def built() -> None:
     )
     leaning = camera.replace(built={"array_tilt": ["40 mrad", "0 mrad"]})
     light = lg.Incoherent(1e-2)
-    whites = [np.asarray(lg.simulate(one, lg.targets.white(), light).data, float) for one in (camera, leaning)]
+    whites = [
+        np.asarray(lg.simulate(one, lg.targets.white(), light).data, float) for one in (camera, leaning)
+    ]
     row([(whites[0], "white image, as described"), (whites[1], "array tilted by 40 mrad")], "built-white")
     changes([(whites[1] - whites[0], "difference")], "built-change")
 
@@ -92,9 +98,13 @@ def derivatives() -> None:
     camera = lg.load_camera("thesis-plenoptic-2-m050").replace(
         main_lens={"diameter": "3 mm"}, lenslets={"count": (9, 9)}, sensor={"shape": (361, 361)}
     )
-    keys = {"focal length of the lenslets": [{"lenslets": {"focal_length": f}} for f in ("5.1999 mm", "5.2001 mm")],
-            "object distance": [{"object_distance": z} for z in ("119.999 mm", "120.001 mm")],
-            "pitch": [{"lenslets": {"pitch": p}} for p in ("149.99 um", "150.01 um")]}  # fmt: skip
+    keys = {
+        "focal length of the lenslets": [
+            {"lenslets": {"focal_length": f}} for f in ("5.1999 mm", "5.2001 mm")
+        ],
+        "object distance": [{"object_distance": z} for z in ("119.999 mm", "120.001 mm")],
+        "pitch": [{"lenslets": {"pitch": p}} for p in ("149.99 um", "150.01 um")],
+    }
     images = camera.part_images([tuple(camera.replace(**end) for end in pair) for pair in keys.values()])
     points = lg.Points(np.array([[2e-5, -4e-5, 4e-3]]), np.array([1.0]))
     row([(root(images.forward(points)), "image of a point, square root")], "derivatives-point")
@@ -105,11 +115,21 @@ def derivatives() -> None:
 def exact() -> None:
     """A point through fast lenslets: paraxial, exact, and their difference."""
     fast = lg.PlenopticCamera(
-        wavelength="550 nm", object_distance="40 mm", main_lens={"focal_length": "20 mm"},
-        lenslets={"pitch": "40 um", "focal_length": "160 um", "count": (5, 5)}, sensor={"pixel_pitch": "0.5 um"},
-    )  # fmt: skip
-    found = [np.asarray(lg.simulate(fast.replace(model=m), lg.targets.points([(3 * um, 5 * um, 2 * mm)]), lg.Incoherent(1e-2)).data, float)
-             for m in ("paraxial", "exact")]  # fmt: skip
+        wavelength="550 nm",
+        object_distance="40 mm",
+        main_lens={"focal_length": "20 mm"},
+        lenslets={"pitch": "40 um", "focal_length": "160 um", "count": (5, 5)},
+        sensor={"pixel_pitch": "0.5 um"},
+    )
+    found = [
+        np.asarray(
+            lg.simulate(
+                fast.replace(model=m), lg.targets.points([(3 * um, 5 * um, 2 * mm)]), lg.Incoherent(1e-2)
+            ).data,
+            float,
+        )
+        for m in ("paraxial", "exact")
+    ]
     shown = [middle(one, 60) for one in found]
     row([(root(shown[0]), "paraxial lenslets, f/4"), (root(shown[1]), "exact")], "exact-point")
     changes([(shown[1] - shown[0], "exact less paraxial")], "exact-change")
@@ -118,10 +138,12 @@ def exact() -> None:
 def operator() -> None:
     """What the operator makes of an object, and its transpose of a raw image."""
     camera = lg.FocusedPlenopticCamera(
-        wavelength=633e-9, object_distance=0.12, main_lens={"focal_length": 0.06},
+        wavelength=633e-9,
+        object_distance=0.12,
+        main_lens={"focal_length": 0.06},
         lenslets={"pitch": 100e-6, "focal_length": 5.2e-3, "count": (9, 9), "magnification": 0.5},
         sensor={"pixel_pitch": 4e-6},
-    )  # fmt: skip
+    )
     linear = camera.operator(samples_per_lenslet=5, accuracy=1e-2)
     star = np.asarray(lg.targets.siemens_star(linear.object_grid, 8).parts[0].intensity, np.float32)
     raw = np.asarray(linear.forward(star))
@@ -166,9 +188,12 @@ def _around(image: np.ndarray, peaks: list[list[tuple[int, int]]], half: int = 1
 def hiding() -> None:
     """A chart behind a card: seen through the card, and hidden by it."""
     camera = lg.PlenopticCamera(
-        wavelength="550 nm", object_distance="120 mm", main_lens={"focal_length": "60 mm"},
-        lenslets={"pitch": "125 um", "focal_length": "5 mm", "count": (15, 15)}, sensor={"pixel_pitch": "8 um"},
-    )  # fmt: skip
+        wavelength="550 nm",
+        object_distance="120 mm",
+        main_lens={"focal_length": "60 mm"},
+        lenslets={"pitch": "125 um", "focal_length": "5 mm", "count": (15, 15)},
+        sensor={"pixel_pitch": "8 um"},
+    )
     grid = lg.Grid.square(60, 15 * 0.125 * mm / 60)
     chart = lg.targets.siemens_star(grid, 8).parts[0].intensity
     cover = ((grid.x[None, :] > 0.1 * mm) & (np.abs(grid.y)[:, None] < 0.5 * mm)).astype(float)
@@ -187,20 +212,36 @@ def spectra() -> None:
         lenslets={"count": (9, 9)}, sensor={"pixel_pitch": "4 um", "shape": None}
     )
     seen = camera.replace(
-        sensor={"fill_factor": 0.8, "angular_response": {"angles": ["0 deg", "0.5 deg", "1 deg", "2 deg"], "values": [1.0, 0.9, 0.65, 0.3]}}
-    )  # fmt: skip
+        sensor={
+            "fill_factor": 0.8,
+            "angular_response": {
+                "angles": ["0 deg", "0.5 deg", "1 deg", "2 deg"],
+                "values": [1.0, 0.9, 0.65, 0.3],
+            },
+        }
+    )
     light = lg.Incoherent(1e-2)
     whites = [np.asarray(lg.simulate(one, lg.targets.white(), light).data, float) for one in (camera, seen)]
     top = max(one.max() for one in whites)
     titles = ("even pixels", "80 % filled, fewer counts aslant")
-    row([(one / top, title) for one, title in zip(whites, titles, strict=True)], "spectra-pixels", vmin=0, vmax=1)
+    row(
+        [(one / top, title) for one, title in zip(whites, titles, strict=True)],
+        "spectra-pixels",
+        vmin=0,
+        vmax=1,
+    )
 
 
 def plan() -> None:
     """How well lengths are known after each picture of a board."""
     camera = lg.load_camera("multi-focus-hex")
-    metric, target = lg.metrology.MetricCamera.of(camera), lg.metrology.Board.from_text("8 x 5 corners, 0.4 mm")
-    nominal = lg.metrology.Nominal(camera.main_lens.focal_length, camera.sensor.pixel_pitch, camera.sensor.shape)
+    metric, target = (
+        lg.metrology.MetricCamera.of(camera),
+        lg.metrology.Board.from_text("8 x 5 corners, 0.4 mm"),
+    )
+    nominal = lg.metrology.Nominal(
+        camera.main_lens.focal_length, camera.sensor.pixel_pitch, camera.sensor.shape
+    )
     found = lg.metrology.plan(metric, camera.calibration, target, nominal, pictures=12)
     numbers = np.arange(1, len(found.steps) + 1)
     known = {name: 100 * found.known[1:, k] for k, name in enumerate(("f", "L", "b", "distances"))}
@@ -222,7 +263,10 @@ def board() -> None:
     raw = lg.simulate(camera, scene, lg.Incoherent(1e-2))
     picture = np.asarray(lg.render(raw, camera.calibration, patch=camera.patch), float)
     part = middle(np.asarray(raw.data, float), 400)
-    row([(part / part.max(), "raw image of a board (the middle)"), (picture / picture.max(), "rendered")], "board-raw")
+    row(
+        [(part / part.max(), "raw image of a board (the middle)"), (picture / picture.max(), "rendered")],
+        "board-raw",
+    )
 
 
 def adaptive() -> None:
@@ -230,15 +274,23 @@ def adaptive() -> None:
     from lumigraph.studies.adaptive import wavefront_map
 
     scope = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
-        wavelength="525 nm", objective={"magnification": 20.0, "numerical_aperture": 0.5, "immersion_index": 1.0},
-        lenslets={"pitch": "125 um", "count": (7, 7)}, sensor={"shape": (135, 135)},
-    )  # fmt: skip
+        wavelength="525 nm",
+        objective={"magnification": 20.0, "numerical_aperture": 0.5, "immersion_index": 1.0},
+        lenslets={"pitch": "125 um", "count": (7, 7)},
+        sensor={"shape": (135, 135)},
+    )
     true = {6: 0.15, 8: -0.1}
     bent = scope.replace(objective={"aberrations": true})
-    images = [1000 * np.asarray(one.point_image(-8e-6, -7e-6, 7.7e-6, accuracy=3e-2)) for one in (scope, bent)]
+    images = [
+        1000 * np.asarray(one.point_image(-8e-6, -7e-6, 7.7e-6, accuracy=3e-2)) for one in (scope, bent)
+    ]
     raw = np.random.default_rng(2).poisson(images[1] + 1).astype(np.float32)
     found = lg.adaptive.estimate(
-        raw, scope, depths=(2e-6, 8e-6, 14e-6), terms=(5, 6, 7, 8), exposure=Exposure(background=1.0, gain=1.0)
+        raw,
+        scope,
+        depths=(2e-6, 8e-6, 14e-6),
+        terms=(5, 6, 7, 8),
+        exposure=Exposure(background=1.0, gain=1.0),
     )
     row([(root(images[0]), "a bead, no aberration"), (root(raw), "raw image, aberrated")], "adaptive-raw")
     maps = [(wavefront_map(true), "true wavefront"), (found.phase(), "found")]
@@ -252,9 +304,12 @@ def scene() -> None:
     from lumigraph.studies.adaptive import wavefront_map
 
     camera = lg.PlenopticCamera(
-        wavelength="600 nm", object_distance="400 mm", main_lens={"focal_length": "200 mm"},
-        lenslets={"pitch": "60 um", "count": (9, 9), "focal_length": "1.25 mm"}, sensor={"pixel_pitch": "5 um"},
-    )  # fmt: skip
+        wavelength="600 nm",
+        object_distance="400 mm",
+        main_lens={"focal_length": "200 mm"},
+        lenslets={"pitch": "60 um", "count": (9, 9), "focal_length": "1.25 mm"},
+        sensor={"pixel_pitch": "5 um"},
+    )
     true, rng = {5: 0.12, 6: -0.15, 7: 0.1, 8: 0.06}, np.random.default_rng(0)
     linear = camera.replace(main_lens={"aberrations": true}).operator((0.0,), 9, accuracy=5e-3)
     texture = gaussian_filter(rng.normal(size=linear.shape[1]), (0, 5, 5))
@@ -274,7 +329,6 @@ def scene() -> None:
 
 def datasets() -> None:
     """Samples of a data set: raw images, pictures and depths."""
-    import os
     import tempfile
 
     import zarr
@@ -285,11 +339,10 @@ def datasets() -> None:
         camera = lg.load_camera("thesis-plenoptic-1").replace(
             lenslets={"count": (21, 21)}, sensor={"pixel_pitch": "8 um", "shape": None}
         )
-        path = os.path.join(folder, "camera.toml")
-        with open(path, "w") as file:
-            file.write(camera.to_toml())
-        store = os.path.join(folder, "train.zarr")
-        if lumigraph(["dataset", path, "-n", "3", "--depth", "-60 mm:60 mm:40 mm", "-o", store]):
+        path = Path(folder) / "camera.toml"
+        path.write_text(camera.to_toml())
+        store = Path(folder) / "train.zarr"
+        if lumigraph(["dataset", str(path), "-n", "3", "--depth", "-60 mm:60 mm:40 mm", "-o", str(store)]):
             raise SystemExit("no data set")
         data = zarr.open_group(store, mode="r")
         raws, pictures, depths = (np.asarray(data[name], float) for name in ("raw", "picture", "depth"))
@@ -320,7 +373,9 @@ def twin() -> None:
     axes[0].imshow(white, cmap="gray")
     axes[0].set_title("white image of the bench", fontsize=9)
     moved = found - meant
-    axes[1].quiver(meant[:, 1], meant[:, 0], moved[:, 1], moved[:, 0], angles="xy", scale_units="xy", scale=0.25)
+    axes[1].quiver(
+        meant[:, 1], meant[:, 0], moved[:, 1], moved[:, 0], angles="xy", scale_units="xy", scale=0.25
+    )
     axes[1].invert_yaxis()
     axes[1].set_aspect("equal")
     axes[1].set_title("micro-images from where the file puts them, x 4", fontsize=9)
@@ -334,9 +389,11 @@ def frames() -> None:
     from lumigraph.deconvolution import filters
 
     scope = lg.LightFieldMicroscope.from_catalogue("lfm-guv").replace(
-        wavelength="525 nm", objective={"magnification": 20.0, "numerical_aperture": 0.5, "immersion_index": 1.0},
-        lenslets={"pitch": "125 um", "count": (11, 11)}, sensor={"shape": (211, 211)},
-    )  # fmt: skip
+        wavelength="525 nm",
+        objective={"magnification": 20.0, "numerical_aperture": 0.5, "immersion_index": 1.0},
+        lenslets={"pitch": "125 um", "count": (11, 11)},
+        sensor={"shape": (211, 211)},
+    )
     depths = np.arange(-24e-6, 25e-6, 12e-6)
     linear = scope.operator(depths, 3, accuracy=1e-2)
     widths = filters.widths_of(scope.low_pass_distances(depths), linear.object_grid.pitch[0])
@@ -349,7 +406,12 @@ def frames() -> None:
         volume = lg.deconvolve(raws[-1], linear, 20, method=RichardsonLucy(filter=filters.LowPass(widths)))
         tops.append(np.asarray(volume).max(0))
     row([(root(one), f"raw image, frame {k}") for k, one in enumerate(raws)], "frames-raw", 2.0)
-    row([(root(one), f"volume from above, frame {k}") for k, one in enumerate(tops)], "frames-volume", 2.0, cmap="magma")
+    row(
+        [(root(one), f"volume from above, frame {k}") for k, one in enumerate(tops)],
+        "frames-volume",
+        2.0,
+        cmap="magma",
+    )
 
 
 def masks() -> None:
@@ -358,7 +420,11 @@ def masks() -> None:
     rng = np.random.default_rng(5)
     code = (rng.random((7, 7)) > 0.45).astype(float)
     plain = lg.load_camera("thesis-2f").replace(sensor={"shape": (96, 96)}, main_lens={"diameter": "4 mm"})
-    kinds = {"clear stop": None, "coded aperture": {"open": code.tolist()}, "diffuser": {"phase": rough.tolist()}}
+    kinds = {
+        "clear stop": None,
+        "coded aperture": {"open": code.tolist()},
+        "diffuser": {"phase": rough.tolist()},
+    }
     pictures = []
     for title, mask in kinds.items():
         camera = plain if mask is None else plain.replace(main_lens={"mask": mask})
@@ -373,7 +439,6 @@ def errors() -> None:
     import contextlib
     import os
     import tempfile
-    from pathlib import Path
 
     from lumigraph.cli import main as lumigraph
 
@@ -402,29 +467,65 @@ def terminal(lines: Sequence[str], name: str) -> None:
 
     wrapped = [part for line in lines for part in (textwrap.wrap(line, 92) or [""])]
     figure = plt.figure(figsize=(7.6, 0.19 * len(wrapped) + 0.2), facecolor="#14181d")
-    figure.text(0.01, 0.98, "\n".join(wrapped).rstrip(), color="#e6e6e6", family="monospace", size=9, va="top")
+    figure.text(
+        0.01, 0.98, "\n".join(wrapped).rstrip(), color="#e6e6e6", family="monospace", size=9, va="top"
+    )
     save(figure, name)
 
 
 def writing() -> None:
     """A file before, while and after it is written: a killed writer leaves the old one or the new one."""
-    steps = [("before", ["volume.zarr  old"]), ("while it is written", ["volume.zarr  old", ".lumigraph-3f  new, not whole"]),
-             ("in one step", ["volume.zarr  new"]), ("killed while writing", ["volume.zarr  old", ".lumigraph-3f  removed next time"])]  # fmt: skip
+    steps = [
+        ("before", ["volume.zarr  old"]),
+        ("while it is written", ["volume.zarr  old", ".lumigraph-3f  new, not whole"]),
+        ("in one step", ["volume.zarr  new"]),
+        ("killed while writing", ["volume.zarr  old", ".lumigraph-3f  removed next time"]),
+    ]
     figure, axes = plt.subplots(1, 4, figsize=(9, 1.5), layout="constrained")
     for where, (title, files) in zip(axes, steps, strict=True):
         where.set_title(title, fontsize=9)
         for k, text in enumerate(files):
-            colour = "#1b7f4b" if "new" in text and "not" not in text else "#35618f" if "old" in text else "#a05a00"
-            where.text(0.5, 0.72 - 0.42 * k, text, ha="center", va="center", fontsize=8.5, color="white",
-                       bbox={"boxstyle": "round,pad=0.5", "color": colour})  # fmt: skip
+            colour = (
+                "#1b7f4b"
+                if "new" in text and "not" not in text
+                else "#35618f"
+                if "old" in text
+                else "#a05a00"
+            )
+            where.text(
+                0.5,
+                0.72 - 0.42 * k,
+                text,
+                ha="center",
+                va="center",
+                fontsize=8.5,
+                color="white",
+                bbox={"boxstyle": "round,pad=0.5", "color": colour},
+            )
         where.set_axis_off()
     save(figure, "trusted-writing")
 
 
 PICTURES = (
-    single, built, derivatives, exact, operator, information, hiding, spectra, plan, board, adaptive, scene, datasets,
-    twin, frames, masks, errors, writing,
-)  # fmt: skip
+    single,
+    built,
+    derivatives,
+    exact,
+    operator,
+    information,
+    hiding,
+    spectra,
+    plan,
+    board,
+    adaptive,
+    scene,
+    datasets,
+    twin,
+    frames,
+    masks,
+    errors,
+    writing,
+)
 
 
 if __name__ == "__main__":
