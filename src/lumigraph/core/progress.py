@@ -37,7 +37,7 @@ class Needs(Stage):
 
 
 def expected(progress: Progress, least: float) -> Progress:
-    """Callback that says once, as soon as it can be foreseen, what a computation takes, if `least` seconds or more.
+    """Callback that says once, as soon as it is foreseen, that a computation takes `least` seconds or more.
 
     >>> told = expected(lambda fraction: print(what_of(fraction)), 0.0)
     >>> told(0.1), told(0.4)  # doctest: +ELLIPSIS

@@ -116,8 +116,8 @@ def deconvolve(
         Background, vignetting, dead pixels, noise; None for the noise that a `RawImage` records. For several
         raw images one for all of them, or a list; None takes their light from what `Sensor.expose` records.
     progress
-        Called with a `RunStep` before the first iteration, whose `memory` and `remaining` say what all of them
-        will take, and after each one.
+        Called with a `RunStep` before the first iteration, whose `memory` and `remaining` say what all
+        of them will take, and after each one.
     checkpoint
         A file (.npz) or `Checkpoint`: written now and then, and read at the start if it is there. Safe to
         interrupt: the same call resumes, and ends with the same result bit for bit.
