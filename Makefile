@@ -62,9 +62,9 @@ audit: $(READY)  ## known holes in the locked dependencies; fails where no advis
 		{ echo "audit: holes are listed above; if none are, the advisory service of PyPI did not answer"; exit 1; }
 
 docs: $(READY)  ## the site, with its gallery: site/index.html; strict, without a network once its tools are there
-	@$(BIN)/python -c "import furo, hypothesis, myst_nb, sphinx_gallery" 2>/dev/null || \
+	@$(BIN)/python -c "import furo, hypothesis, joblib, myst_nb, sphinx_gallery" 2>/dev/null || \
 		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r docs/requirements.lock
-	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html docs site
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m sphinx -j auto --fail-on-warning --keep-going --quiet -b html docs site
 
 torch: $(READY)  ## optional: PyTorch, so that the array tests run on it too
 	@$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/python -m pip install --quiet --disable-pip-version-check "torch==2.13.0"

@@ -1,6 +1,7 @@
 """The site: `make docs` builds it into site/, strictly and without a network."""
 
 import shutil
+import sys
 from importlib import import_module
 from importlib.metadata import version as _version
 from inspect import ismodule
@@ -13,6 +14,9 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
+
+sys.path.insert(0, str(Path(__file__).parent))
+import accessible
 
 import lumigraph
 from lumigraph.cli.app import VERBS
@@ -77,18 +81,23 @@ def _figures(block: Any, variables: dict[str, Any], gallery: dict[str, Any]) -> 
     """Save the figures and the films (paths that end in .gif) that a block of an example has made."""
     from sphinx_gallery.scrapers import figure_rst
 
-    found, known = [], gallery.setdefault("_figures", set())
+    source, saved = gallery.get("_saved", ("", []))
+    if source != variables["src_file"]:  # things, not their `id`: that of a figure may be a later one's again
+        saved = []
+    gallery["_saved"] = variables["src_file"], saved
+    found = []
     for thing in variables["example_globals"].values():
-        if isinstance(thing, Figure) and id(thing) not in known:
-            known.add(id(thing))
-            path = Path(next(variables["image_path_iterator"]))
-            thing.savefig(path, dpi=110)
-            found.append(str(path))
-        elif isinstance(thing, Path) and thing.suffix == ".gif" and thing not in known:
-            known.add(thing)
-            path = Path(next(variables["image_path_iterator"])).with_suffix(".gif")
+        film = isinstance(thing, Path) and thing.suffix == ".gif"
+        if not (film or isinstance(thing, Figure)) or any(thing is one for one in saved):
+            continue
+        saved.append(thing)
+        path = Path(next(variables["image_path_iterator"]))
+        if film:
+            path = path.with_suffix(".gif")
             shutil.copy(thing, path)
-            found.append(str(path))
+        else:
+            thing.savefig(path, dpi=110)
+        found.append(str(path))
     return figure_rst(found, gallery["src_dir"])
 
 
@@ -98,7 +107,8 @@ def _every_name_has_a_page(app: Any, error: Exception | None) -> None:
         return
     there = app.env.get_domain("py").objects
     modules = [name for name, entry in there.items() if entry.objtype == "module"]
-    wanted = [f"lumigraph.{name}" for name in lumigraph.__all__ if name != "targets"]
+    public = {name: getattr(lumigraph, name) for name in lumigraph.__all__ if name != "targets"}
+    wanted = [one.__name__ if ismodule(one) else f"lumigraph.{name}" for name, one in public.items()]
     wanted += [f"{module}.{name}" for module in modules for name in _own(module)]
     if missing := [name for name in wanted if name not in there]:
         raise ExtensionError(f"no page of the site has {', '.join(sorted(missing))}.")
@@ -106,7 +116,9 @@ def _every_name_has_a_page(app: Any, error: Exception | None) -> None:
 
 def setup(app: Any) -> None:
     """Sphinx calls this."""
+    app.extensions["sphinx-mathjax-offline"].parallel_read_safe = True  # it copies files at the end
     app.connect("build-finished", _every_name_has_a_page)
+    app.connect("build-finished", accessible.finish)
     app.add_directive("verbs", _Verbs)
 
 
@@ -134,6 +146,7 @@ sphinx_gallery_conf = {
     "within_subsection_order": "FileNameSortKey",
     "reset_modules": (),
     "abort_on_example_error": True,
+    "parallel": True,  # as many as Sphinx's own processes (-j)
     "only_warn_on_example_error": False,
     "download_all_examples": False,
     "remove_config_comments": True,

@@ -1,5 +1,7 @@
 """Richardson-Lucy: what can be proved of it."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -143,11 +145,30 @@ def test_it_stops_where_little_changes(rng):
     assert len(steps) < 100
 
 
+def test_time_and_memory_are_said_before_the_first_iteration(rng):
+    """A product takes 0.02 s here, so that 50 iterations are foreseen to take two seconds."""
+    steps = []
+
+    class Slow(Matrix):
+        def forward(self, x):
+            time.sleep(0.02)
+            return super().forward(x)
+
+    operator = Slow(np.kron(blur(SHAPE[0], 1.0), blur(SHAPE[1], 1.0)), SHAPE, SHAPE)
+    lg.deconvolve(noisy(operator, disc(SHAPE), rng), operator, Stop(50, change=0.9), progress=steps.append)
+    first, second = steps[:2]
+    assert first.announces
+    assert not second.announces
+    assert (first.iteration, first.iterations, first.elapsed) == (0, 50, 0.0)
+    assert 2.0 <= first.remaining < 5.0
+    assert first.memory >= operator.memory_bytes + 4 * 8 * np.prod(SHAPE)
+
+
 def test_progress_counts_and_tells_the_time_left(rng):
     operator, steps = blurred(SHAPE, 1.0), []
     lg.deconvolve(noisy(operator, disc(SHAPE), rng), operator, 4, progress=steps.append)
-    assert [step.iteration for step in steps] == [1, 2, 3, 4]
-    assert steps[1].remaining == pytest.approx(steps[1].elapsed)
+    assert [step.iteration for step in steps] == [0, 1, 2, 3, 4]
+    assert steps[2].remaining == pytest.approx(steps[2].elapsed)
     assert steps[-1].stopped == "4 iterations"
 
 

@@ -4,16 +4,19 @@ import numpy as np
 import pytest
 
 import lumigraph as lg
+from lumigraph import viewer
+from lumigraph.report import Page
 from lumigraph.viewer.opening import of_raw, of_views, of_volume
 from viewer_pages import served
 
 
 def exhibits(views):
+    """What each mode shows; None leaves out those of views."""
     camera = lg.load_camera("thesis-plenoptic-2-m050").replace(lenslets={"count": (3, 3)})
     raw = lg.RawImage(np.random.default_rng(1).random(camera.calibration.shape), 5e-6)
     volume = lg.Volume(np.ones((3, 20, 30)), lg.Grid((20, 30), 1e-6), (0, 1e-6, 2e-6))
-    return {
-        "picture": of_views("views", views), "depth": of_views("views", views),
+    seen = {} if views is None else dict.fromkeys(("picture", "depth"), of_views("views", views))
+    return seen | {
         "raw": of_raw("raw", raw, camera.calibration), "volume": of_volume("volume", volume),
     }  # fmt: skip
 
@@ -28,6 +31,44 @@ def test_the_viewer_is_accessible(open_page, views, violations, mode, scheme):
         if mode == "depth":  # its last part comes after it shows
             page.wait("Boolean(lumigraph.app.main.model.arrays.error)")
         assert violations(page.page) == []
+
+
+def test_windows_and_facts_over_the_picture_are_accessible(open_page, views, violations):
+    with served(of_views("views", views)) as address:
+        page = open_page(address, color_scheme="dark")
+        page.page.click("#about summary")
+        assert violations(page.page) == []
+        for button, window in (("#help", "#keys"), ("#save-film", "#film")):
+            page.page.click(button)
+            page.wait(f"document.querySelector('{window}').open")
+            assert violations(page.page) == []
+            page.page.keyboard.press("Escape")
+
+
+@pytest.mark.parametrize("projection", ["max-z", "fog"])
+def test_a_volume_from_all_sides_is_accessible(open_page, violations, projection):
+    with served(exhibits(None)["volume"]) as address:
+        page = open_page(address, color_scheme="dark")
+        page.set(mode="volume", projection=projection)
+        assert violations(page.page) == []
+
+
+def test_a_page_of_one_file_and_a_report_are_accessible(browser, views, violations, tmp_path):
+    viewer.export([of_views("views", views)], tmp_path / "page.html")
+    report = Page("Two pixels", "A report.")
+    section = report.section("Numbers").table({"pitch": "14 px"}, caption="Of the lattice")
+    section.figure(np.eye(9), "Nine pixels", zoom=20).lines("a   b")
+    (tmp_path / "report.html").write_text(report.html(), "utf-8")
+    context = browser.new_context(color_scheme="dark", bypass_csp=True)
+    try:
+        page = context.new_page()
+        page.goto((tmp_path / "page.html").as_uri())
+        page.wait_for_function("Boolean(window.lumigraph?.ready && lumigraph.app.first)")
+        assert violations(page) == []
+        page.goto((tmp_path / "report.html").as_uri())
+        assert violations(page) == []
+    finally:
+        context.close()
 
 
 def test_the_histogram_says_where_black_and_white_are(open_page, views):

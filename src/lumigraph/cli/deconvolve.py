@@ -17,7 +17,8 @@ from lumigraph.cli.deconvolved import reached, result
 from lumigraph.cli.options import Output
 from lumigraph.cli.reporting import REPORTED, ReportOptions
 from lumigraph.cli.several import SEVERAL, SeveralOptions, Shifts, with_shifts
-from lumigraph.core.progress import Progress, Stage, silent, within
+from lumigraph.core import memory
+from lumigraph.core.progress import Needs, Progress, Stage, expected, silent, within
 from lumigraph.core.result import Result
 from lumigraph.errors import FormatError, LumigraphError
 
@@ -31,6 +32,10 @@ if TYPE_CHECKING:
     from lumigraph.deconvolution import Deconvolver
     from lumigraph.deconvolution.run import RunStep
     from lumigraph.instruments import Instrument
+
+
+LONG = 5.0
+"""Seconds from which on it is said beforehand how long something will take."""
 
 
 def deconvolve(
@@ -93,7 +98,7 @@ def deconvolve(
     written, steps, found = [], [], None
     with progress("deconvolve") as shown:
         ready = seen.prepared(frames[0][1], described)
-        made = within(shown, 0.0, 1.0, "point images")
+        made = expected(within(shown, 0.0, 1.0, "point images"), LONG)
         made(0.0)
         raws = [ready, *(seen.prepared(frame, described) for frame in more)]
         shifts, moved = several.where(described, raws, within(shown, 0.0, 1.0, "shifts"))
@@ -265,6 +270,10 @@ class _Task:
         (steps, shown), name, gain = followed, "", None
 
         def follow(step: "RunStep") -> None:
+            if step.announces:
+                if step.remaining > LONG:
+                    shown(Needs(0.0, _needs(step)))
+                return
             steps.append(step)
             what = f"{name[1:]} {reached(step, gain)}".strip()
             shown(Stage(step.iteration / step.iterations, what))
@@ -282,6 +291,14 @@ class _Task:
             kept = _named(self.output, f"{name}.partial")
             io.save(stopped.partial, kept)
             raise KeyboardInterrupt(f"{stopped.iterations} iterations are in {kept}.") from None
+
+
+def _needs(step: "RunStep") -> str:
+    """Time and memory of all iterations, in words."""
+    return (
+        f"at most {step.iterations - step.iteration} iterations, about {step.remaining:.0f} s, "
+        f"{memory.told(step.memory)}"
+    )
 
 
 def _check_gain(way: MethodOptions, gain: float | None) -> None:

@@ -1,9 +1,14 @@
 """Progress of a computation: callbacks that receive the fraction done."""
 
+import time
 from collections.abc import Callable
 
 Progress = Callable[[float], None]
 """Called with the fraction that is done, from 0 to 1: any function of a number. See `Stage`."""
+
+
+_FORESEEN = 0.04
+"""Fraction of a computation from which the time of all of it is foreseen."""
 
 
 class Stage(float):
@@ -29,6 +34,34 @@ class Needs(Stage):
     >>> within(lambda told: print(type(told).__name__, told.what), 0, 1)(Needs(0.0, "300 MiB, about 40 s"))
     Needs 300 MiB, about 40 s
     """
+
+
+def expected(progress: Progress, least: float) -> Progress:
+    """Callback that says once, as soon as it is foreseen, that a computation takes `least` seconds or more.
+
+    >>> told = expected(lambda fraction: print(what_of(fraction)), 0.0)
+    >>> told(0.1), told(0.4)  # doctest: +ELLIPSIS
+    <BLANKLINE>
+    about ... s
+    ...
+    """
+    first: tuple[float, float] | None = None  # what comes before the first step is done once
+    said = False
+
+    def tell(fraction: float) -> None:
+        nonlocal first, said
+        now = time.monotonic()
+        if first is None and fraction > 0:
+            first = fraction, now
+        elif first is not None and not said and _FORESEEN <= fraction - first[0] < 0.5:
+            whole = (now - first[1]) / (fraction - first[0])
+            if said := whole >= least:
+                told = ": ".join(filter(None, (what_of(fraction), f"about {whole:.0f} s")))
+                progress(Needs(fraction, told))
+                return
+        progress(fraction)
+
+    return tell
 
 
 def silent(fraction: float) -> None:

@@ -2,6 +2,7 @@
 
 import math
 import os
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, overload
@@ -115,7 +116,8 @@ def deconvolve(
         Background, vignetting, dead pixels, noise; None for the noise that a `RawImage` records. For several
         raw images one for all of them, or a list; None takes their light from what `Sensor.expose` records.
     progress
-        Called with a `Step` after each iteration.
+        Called with a `RunStep` before the first iteration, whose `memory` and `remaining` say what all
+        of them will take, and after each one.
     checkpoint
         A file (.npz) or `Checkpoint`: written now and then, and read at the start if it is there. Safe to
         interrupt: the same call resumes, and ends with the same result bit for bit.
@@ -240,6 +242,7 @@ class Deconvolver:
         self._scale: tuple[str, Scale] | None = None
         self._pictured: Array | None = None
         self._last: Array | None = None
+        self._pace = math.nan
 
     @single_products()  # threads of small products spin: three times the work on a busy machine
     def __call__(
@@ -269,7 +272,7 @@ class Deconvolver:
         problem = Problem.of(raw, exposure, self._scaled(exposure, data))
         wanted = self.operator, self._inside, self._pictured
         run = Run(problem, self.method, self.limits, progress, wanted, start=self._begun(problem))
-        run.counted = exposure.gain is not None
+        run.counted, run.needs = exposure.gain is not None, (self._pace, self._size(data))
         if checkpoint is not None:
             run.checkpoint = Checkpoint.of(checkpoint)
             run.key = fingerprint(data, exposure, self.method, run.start)
@@ -338,6 +341,10 @@ class Deconvolver:
         """Begin the next raw image as if it were the first one, though starts are warm."""
         self._last = None
 
+    def _size(self, data: Array) -> float:
+        """Memory of the operator and of what an iteration holds [bytes]."""
+        return _held(self._wide, data) + self._wide.memory_bytes
+
     def _begun(self, problem: Problem) -> Array | None:
         """A warm start: the last object and an even one."""
         if self._last is None or tuple(self._last.shape) != tuple(problem.scale.sensitivity.shape):
@@ -350,7 +357,10 @@ class Deconvolver:
         if self._scale is None or self._scale[0] != key:
             _require(self._wide, data)
             scale = Scale.of(self._wide, exposure, data, least_seen(self.operator))
-            self._scale = key, scale if self.method.start is not None else scale.begun()
+            began = time.perf_counter()  # the operator has what it makes at its first use
+            even = scale.begun()
+            self._pace = 2 * (time.perf_counter() - began)  # A and its transpose
+            self._scale = key, scale if self.method.start is not None else even
             if looks_beyond(self.operator):
                 self._pictured = scale.pictured(BESIDE)
         return self._scale[1]
@@ -377,7 +387,11 @@ def _check(operator: Linear, method: Method) -> None:
     check_offers("method", method, ("step", "start"), "Give RichardsonLucy() or LeastSquares().")
 
 
+def _held(operator: Linear, data: Array) -> float:
+    """Arrays of the object's size that an iteration holds [bytes]."""
+    return COPIES * math.prod(operator.shape[1]) * (4 if arrays.is_single(data) else 8)
+
+
 def _require(operator: Linear, data: Array) -> None:
-    size = math.prod(operator.shape[1]) * (4 if arrays.is_single(data) else 8)
     what = f"a deconvolution into {' x '.join(map(str, operator.shape[1]))} samples"
-    memory.require(COPIES * size, what, "Use fewer planes, or coarser samples.", SamplingError)
+    memory.require(_held(operator, data), what, "Use fewer planes, or coarser samples.", SamplingError)

@@ -38,6 +38,8 @@ class RunStep:
         Time [s] so far, and still to go at the present pace.
     stopped
         Reason to stop before the last iteration; empty while it continues.
+    memory
+        What operator and iterations hold [bytes]; only of the step before the first iteration.
     """
 
     iteration: int
@@ -47,6 +49,12 @@ class RunStep:
     elapsed: float
     remaining: float
     stopped: str = ""
+    memory: float = math.nan
+
+    @property
+    def announces(self) -> bool:
+        """True of the step before the first iteration, with the time and memory that all will take."""
+        return not math.isnan(self.memory)
 
 
 Report = Callable[[RunStep], None]
@@ -65,7 +73,8 @@ class Interrupted(KeyboardInterrupt):
 class Run:
     """A problem, a method and when to stop; `wanted` are the operator and the part of the object to return.
 
-    `counted` says whether deviances are in electrons; `fall` is the decrease of it in the last step.
+    `counted` says whether deviances are in electrons; `fall` is the decrease of it in the last step; `needs`
+    are the time of an iteration [s] and the memory of all [bytes], as far as they are known beforehand.
     """
 
     problem: Problem
@@ -79,6 +88,7 @@ class Run:
     start: Array | None = None
     counted: bool = False
     fall: float = math.inf
+    needs: tuple[float, float] = (math.nan, 0.0)
 
     def states(self) -> Iterator[State]:
         """The first state and each that follows, until it is time to stop."""
@@ -86,6 +96,7 @@ class Run:
         state = self._first()
         first, change = state.done, np.inf
         yield state
+        self._announce(state)
         while not self.limits.reached(state.done, state.deviance, change):
             before, state = state, self.method.step(self.problem, state)
             self.fall = before.deviance - state.deviance
@@ -116,6 +127,18 @@ class Run:
             raise GeometryError(f"start has shape {tuple(start.shape)} but the object has {needed}.")
         start = continued(start, tuple(self.problem.scale.sensitivity.shape), self.wanted[1])
         return State.at(self.problem, arrays.like(np.asarray(arrays.to_numpy(start)), self.problem.data))
+
+    def _announce(self, state: State) -> None:
+        """Say what the iterations will take, before the first one."""
+        limits, (seconds, size) = self.limits, self.needs
+        if self.progress is None or limits.reached(state.done, state.deviance, np.inf):
+            return
+        left = limits.iterations - state.done
+        self.progress(
+            RunStep(
+                state.done, limits.iterations, state.deviance, np.inf, 0.0, left * seconds, memory=size
+            )
+        )
 
     def _tell(self, state: State, change: float, first: int) -> None:
         if self.progress is None:

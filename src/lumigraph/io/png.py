@@ -154,8 +154,9 @@ def _check_chunks(path: Path) -> None:
             if at > size or len(start) < 8:
                 raise FormatError(f"{path} is cut short: a chunk ends at byte {at} of {size}. Copy it again.")
             if _checksum(file, kind, length) != int.from_bytes(file.read(4), "big"):
+                name = kind.decode("latin-1")
                 raise FormatError(
-                    f"{path} is damaged: its chunk {kind!r} differs from its checksum. Copy it again."
+                    f"{path} is damaged: its chunk {name!r} differs from its checksum. Copy it again."
                 )
 
 

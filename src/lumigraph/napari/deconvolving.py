@@ -64,6 +64,9 @@ class Deconvolve(Panel):
 
             def follow(step: RunStep) -> None:
                 nonlocal reached
+                if step.announces:
+                    tell(Stage(_MODEL, f"about {step.remaining:.0f} s"))
+                    return
                 reached, part = step.iteration, step.iteration / step.iterations
                 what = f"iteration {reached}, the last changed {100 * step.change:.2g} %"
                 tell(Stage(_MODEL + (1 - _MODEL) * part, what))
