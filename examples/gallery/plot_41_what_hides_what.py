@@ -42,7 +42,7 @@ raw = lg.simulate(camera, scene, lg.Incoherent(1e-2))
 print(f"{time.perf_counter() - began:.0f} s, operators included; {raw.metadata['error']}")
 
 # %%
-# Each lenslet blurs the directions that it sees, so that depths come out too small. `lumigraph.depth.unbiased`
+# Each lenslet blurs the directions that it sees: depths come out too small. `lumigraph.depth.unbiased`
 # takes that away, by planes of known depth that the same camera sees; here the slope alone is measured.
 
 views = lg.decode(raw, camera.calibration)

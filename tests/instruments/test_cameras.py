@@ -113,7 +113,7 @@ def test_the_patch_of_the_focused_plane():
 
 
 def test_tiles_of_a_grating_meet_at_the_patch_by_waves():
-    """By waves forward from lines of points; at 0.1 periods a lenslet rays have 1, one lenslet alone 1.106."""
+    """By waves forward from lines; at 0.1 periods a lenslet rays have 1, one lenslet alone 1.106."""
     camera, dz = focused(0.5).replace(lenslets={"shape": "round"}), 10e-3
     lined = LinedCamera.of(camera, dz)
     n, reach = lined.samples, lined.spreads.shape[-1] // lined.samples

@@ -135,9 +135,7 @@ class Run:
             return
         left = limits.iterations - state.done
         self.progress(
-            RunStep(
-                state.done, limits.iterations, state.deviance, np.inf, 0.0, left * seconds, memory=size
-            )
+            RunStep(state.done, limits.iterations, state.deviance, np.inf, 0.0, left * seconds, memory=size)
         )
 
     def _tell(self, state: State, change: float, first: int) -> None:

@@ -5,7 +5,7 @@ import warnings
 from typing import Any
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from lumigraph.core.arrays import to_numpy
 from lumigraph.core.lightfield import LightField
@@ -97,7 +97,7 @@ def _compared(views: LightField[Any], wide: bool) -> dict[str, float] | None:
             for (v, u), view in around.items():
                 y, x = (u, v) if swap else (v, u)
                 total += np.abs(_moved(view, sv * slope * y * aspect, su * slope * x) - middle)
-            maps.append(ndimage.uniform_filter(total / len(around), _WINDOW))
+            maps.append(scipy.ndimage.uniform_filter(total / len(around), _WINDOW))
         costs[order] = float(_inner(np.min(maps, 0)).mean()) / contrast
     return costs
 
@@ -143,7 +143,7 @@ def _reduced(view: np.ndarray, step: int) -> np.ndarray:
 
 def _detail(grey: np.ndarray) -> np.ndarray:
     """What a picture shows without its brightness, which vignetting changes from view to view."""
-    fine = grey - ndimage.gaussian_filter(grey, _SMOOTH)
+    fine = grey - scipy.ndimage.gaussian_filter(grey, _SMOOTH)
     least = _FLAT * float(np.abs(grey).max())
     return fine / spread if (spread := float(fine.std())) > least else np.zeros_like(fine)
 
