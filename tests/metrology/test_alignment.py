@@ -205,6 +205,22 @@ def test_an_inverted_axis_is_told_and_the_bench_goes_back(camera):
     assert all(abs(one.position) < 2 * one.motor.step for one in made.motors)
 
 
+def test_moves_that_made_things_worse_twice_end_where_it_was_best(camera):
+    """Somebody knocks at the bench, more each time, and too little for one motor to be blamed."""
+    options = {"out": {"shift_x": "8 um"}, "signs": {"shift_x": 1}}
+    devices, made, reader = bench(camera, motors=[{**MOTORS[2], "sign": 1}], **options)
+
+    class Knocked:
+        rng = made.rng
+
+        def truth(self):
+            truth = made.truth()
+            return truth | {"shift_x": truth["shift_x"] + 1e-6 * (0, 0, 11, 30)[made.exposures]}
+
+    with pytest.raises(BenchError, match=r"made things worse twice.*brought back to its best place"):
+        list(lg.metrology.align(devices, reader.shows(Knocked()), goal=GOAL))
+
+
 def test_lost_light_stops_and_says_so(camera):
     devices, made, reader = bench(camera)
     steps = lg.metrology.align(devices, reader, goal=GOAL)

@@ -46,12 +46,12 @@ def test_heights_and_tilts_of_a_microscope_s_array_are_read_from_the_widths_of_m
     light = white_of(reader.camera, true, around=1e-4)
     picture = 3e4 * (light / light.max() + 0.005 * np.random.default_rng(1).standard_normal(light.shape)) + 64
     first = reader.read(picture)
-    found = reader.matched(picture, first, true * 0.7)
+    found = reader.matched(picture, first, true * 0.95)
     off = found.values - reader.rays.measures(true)
     assert found.matched
     assert first.errors[9] > 1  # one picture alone does not show how widths grow
     assert off[:4] == pytest.approx(0, abs=2e-4)  # px
-    assert off[4:6] == pytest.approx(0, abs=6e-3)  # 40 nm: the prediction is off by 1.2 µm
+    assert off[4:6] == pytest.approx(0, abs=2e-3)
     reach = reader.rays.reach * reader.rays.lengths[2]
     assert np.abs(off[9:] / found.errors[9:]).max() < 3.5
     assert found.errors[9:].max() * reader.rays.lengths[1] / reach < 3e-4  # rad, of 4e-3 and 6e-3

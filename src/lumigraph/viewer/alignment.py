@@ -50,7 +50,12 @@ def shown_step(log: AlignmentLog, number: int) -> dict[str, Any]:
             f"± {shown(name, 1.96 * found['errors'][name], signed=False)}",
             "" if expected is None else shown(name, expected),
             "" if reached is None else shown(name, reached),
-            f"{shown(name, play, signed=False)} ± {shown(name, 1.96 * error, signed=False)}" if play else "",
+            _interval(name, play, 1.96 * error) if play else "",
         ])  # fmt: skip
     image = "data:image/png;base64," + b64encode(log.picture(number)).decode()
     return {name: found[name] for name in _KEPT} | {"rows": rows, "png": image}
+
+
+def _interval(name: str, value: float, half: float) -> str:
+    """A value and half its interval, with one unit."""
+    return f"{shown(name, value, signed=False).rstrip(' µm°%')} ± {shown(name, half, signed=False)}"
