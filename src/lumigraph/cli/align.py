@@ -44,7 +44,7 @@ def align(
     Parameters
     ----------
     camera
-        Camera file, or a name of the catalogue: the intended bench.
+        Camera or microscope file, or a name of the catalogue: the intended bench.
     log
         Folder of the steps, by default bench.log beside BENCH. The same command resumes when interrupted.
     dark
