@@ -31,8 +31,8 @@ LARGEST = 1.5
 class GratingImage:
     r"""Image of a grating behind the main lens of a camera 2.0.
 
-    With the pupil at u, the lenslets' transmission A(X), z' from the pupil to the image, L to the lenslets and
-    b on to the sensor, a pixel at y would send back to the pupil
+    With the pupil at u, the lenslets' transmission A(X), z' from the pupil to the image, L to the lenslets
+    and b on to the sensor, a pixel at y would send back to the pupil
 
     .. math:: g_y(u) = P(u) e^{i\pi u^2 (1/L - 1/z')/\lambda} \int A(X)
               e^{i\pi X^2 (1/L + 1/b)/\lambda} e^{-2\pi i X (u/L + y/b)/\lambda} dX

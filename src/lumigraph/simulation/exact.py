@@ -114,8 +114,7 @@ def _lit(
 ) -> tuple[np.ndarray, error.ReachedError]:  # fmt: skip
     """Image of a slice in coherent or partially coherent light (ny, nx), and its error."""
     if isinstance(light, PartiallyCoherent):
-        accuracy = max(accuracy, light.accuracy / 3)
-        found = in_lamp_light(camera, part, light, accuracy, progress)
+        found = in_lamp_light(camera, part, light, max(accuracy, light.accuracy / 3), progress)
         if found is not None:
             return found
     reached = error.of_quadrature("coherent", accuracy).through(camera)
