@@ -17,7 +17,7 @@ from lumigraph.core.result import Quantity
 from lumigraph.errors import CalibrationError, FormatError, GeometryError
 from lumigraph.instruments import load_camera
 from lumigraph.metrology.boards.places import places, residual
-from lumigraph.metrology.datasheet import steady
+from lumigraph.metrology.datasheet import stability, steady
 from lumigraph.metrology.datasheet.charts import check_camera
 from lumigraph.metrology.datasheet.exposures import DrawnExposures, FileExposures, mean_image
 from lumigraph.metrology.datasheet.lights import usual_depths, usual_exposures
@@ -361,3 +361,35 @@ def test_charts_stand_on_either_side_of_the_focus(name):
     depths = usual_depths(check_camera(load_camera(name)))
     assert min(depths) < 0 < max(depths)
     assert 0.0 in depths
+
+
+def test_dated_white_images_show_the_drift_a_day(tmp_path):
+    """Drawn white images move by 0.02 and -0.01 px a day, turn, grow and fade."""
+    rng = np.random.default_rng(4)
+    for day in range(6):
+        pitch, turn = 15.3 * (1 + 20e-6 * day), 0.004 + 3e-5 * day
+        # Of the lenslet in the middle: it is there that the offset is measured.
+        row = pitch * np.array([np.sin(turn), np.cos(turn)])
+        middle = np.array([153.0 + 0.02 * day, 168.3 - 0.01 * day])
+        origin = middle - 9 * np.array([row[1], -row[0]]) - 10 * row
+        image = drawn_white(lg.Lattice.square(pitch, turn, origin=tuple(origin)), (306, 340), fill=0.85)[0]
+        noisy = 2000 * (1 - 0.004 * day) * image + rng.normal(0, 3, image.shape)
+        raw = RawImage(np.clip(noisy, 0, 4095).astype(np.uint16), 5e-6)
+        lg.save(raw, tmp_path / f"white-2024-03-{day + 1:02d}.tiff")
+    sheet = lg.metrology.datasheet(lg.metrology.read_charts(tmp_path))
+    found = {e.quantity.name: e.quantity for e in sheet.entries if e.section == "Stability"}
+    truth = {"drift_y": 0.02, "drift_x": -0.01, "drift_of_pitch": 20, "drift_of_rotation": 0.03}
+    for name, value in truth.items():
+        low, high = found[name].interval
+        assert low - 0.03 * abs(value) <= value <= high + 0.03 * abs(value)
+        assert high - low < 0.5 * abs(value)
+    assert found["drift_of_light"].value == pytest.approx(-0.4, abs=0.02)
+
+
+def test_two_dates_are_too_few_for_a_drift(light):
+    first, second = stability.date_in("white-2024-03-01.png"), stability.date_in("white_20240302T0930.png")
+    lattice = calibrate(RawImage(light, 5e-6))
+    entries = stability.stability([RawImage(light, 5e-6)] * 2, lattice, [first, second])
+    assert all(one.value is None and "2 dates, but a drift needs 3" in one.how for one in entries)
+    assert len(entries) == 5
+    assert stability.stability([RawImage(light, 5e-6)] * 2, lattice) == []

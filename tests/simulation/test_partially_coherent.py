@@ -9,11 +9,12 @@ import pytest
 from benchmarks import references
 
 import cameras
+from lumigraph.core.field import Field
 from lumigraph.core.grid import Grid
 from lumigraph.core.modes import CoherentModes
 from lumigraph.core.progress import Needs
 from lumigraph.errors import GeometryError, SamplingError
-from lumigraph.instruments import LightFieldMicroscope, SingleLensCamera
+from lumigraph.instruments import FocusedPlenopticCamera, LightFieldMicroscope, SingleLensCamera
 from lumigraph.scene import ExtendedSource, GaussianSchell, Scene, Slice, SpectralLine, targets
 from lumigraph.simulation import Coherent, Incoherent, PartiallyCoherent, Spectrum, TiltedWaves, simulate
 from lumigraph.units import mm, nm, um
@@ -111,6 +112,36 @@ def test_a_wider_accuracy_takes_fewer_modes_and_states_what_that_does_to_the_ima
     for accuracy in (1e-1, 1e-2):
         raw = simulate(SINGLE, scene(), PartiallyCoherent(source, accuracy))
         assert 0.5 < raw.metadata["error"]["rms"] / relative(raw.data, fine) < 3
+
+
+def test_a_wide_object_takes_as_many_waves_as_a_pixel_tells_apart():
+    """Said before they are followed; fewer than the modes."""
+    grid = Grid((40, 40), 20 * um)
+    wide = Scene([Slice(np.random.default_rng(0).random(grid.shape), grid)])
+    source, told = ExtendedSource.disc(0.005, -SINGLE.object_distance), []
+    raw = simulate(SINGLE, wide, PartiallyCoherent(source, 1e-2), progress=told.append)
+    modes = source.modes(grid, SINGLE.wavelength, accuracy=3e-3, dtype=np.complex64)
+    exact = simulate(SINGLE, wide, PartiallyCoherent(modes)).data
+    assert "waves of the source, coherent over" in raw.metadata["error"]["source"]
+    assert relative(raw.data, exact) < 1.3 * raw.metadata["error"]["rms"] < 1.3e-2
+    count = re.search(r"(\d+) waves of the source", told[0].what)
+    assert count is not None
+    assert int(count[1]) < modes.count / 1.5
+
+
+@pytest.mark.long
+def test_a_lamp_before_many_lenslets_is_the_sum_of_its_modes():
+    camera = FocusedPlenopticCamera.from_catalogue("thesis-prototype")
+    camera = camera.replace(lenslets={"count": (5, 5)}, sensor={"shape": None})
+    picture = np.random.default_rng(0).random((60, 60)) > 0.5
+    wide = Scene([Slice(picture.astype(float), camera.scene_grid)])
+    source = ExtendedSource.disc(0.01, -camera.object_distance)
+    raw = simulate(camera, wide, PartiallyCoherent(source, 1e-2))
+    modes = source.waves(camera.scene_grid, camera.wavelength, 0.0, 0.7e-3)
+    modes = CoherentModes(Field(modes, camera.scene_grid, camera.wavelength), 0.0)
+    exact = simulate(camera, wide, PartiallyCoherent(modes)).data
+    assert "waves of the source" in raw.metadata["error"]["source"]
+    assert relative(raw.data, exact) < 1.3 * raw.metadata["error"]["rms"] < 1.3e-2
 
 
 def test_modes_may_be_given_and_go_to_the_depth_of_a_slice():

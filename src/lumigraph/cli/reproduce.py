@@ -8,8 +8,9 @@ from cyclopts import Parameter
 
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import COMMON, Common, Output
+from lumigraph.core.arrays import WORKERS
 from lumigraph.core.printable import printable
-from lumigraph.core.progress import Stage
+from lumigraph.core.progress import Progress, Stage
 from lumigraph.core.result import Result
 from lumigraph.errors import FormatError
 
@@ -25,6 +26,7 @@ def reproduce(
     list_: Annotated[bool, Parameter(name="--list", negative="")] = False,
     quick: Flag = False,
     fresh: Flag = False,
+    workers: Annotated[int | None, Parameter(allow_leading_hyphen=True)] = None,
     output: Output = Path("reproduce"),
     common: Common = COMMON,
 ) -> Result:
@@ -47,6 +49,8 @@ def reproduce(
         Run reduced sizes of the same physics, in minutes.
     fresh
         Compute everything again.
+    workers
+        Processes that run experiments side by side; as many as the machine has processors if left out.
     output
         Folder for the results; made if it does not exist.
     """
@@ -56,13 +60,13 @@ def reproduce(
     if list_:
         return _listed(chosen)
     _check_folder(output)
+    if workers is not None and workers < 1:
+        raise FormatError(f"--workers is {workers} but must be at least 1.")
     from lumigraph.studies.thesis import pages, run
 
     output.mkdir(parents=True, exist_ok=True)
     with progress("reproduce") as shown:
-        results = run.run(
-            chosen, output, quick=quick, fresh=fresh, progress=shown, finished=_tell
-        )  # fmt: skip
+        results = _results(chosen, output, workers or WORKERS, (quick, fresh), shown)
         shown(Stage(1.0, "report"))
         pages.write_report(chosen, results, output / "report.html", quick=quick)
         run.write_records(results, output / "results.json")
@@ -75,6 +79,23 @@ def reproduce(
         rows=run.records(results),
         failure=_failure(results, output),
     )
+
+
+def _results(
+    chosen: "tuple[Experiment, ...]", output: Path, workers: int, how: tuple[bool, bool], shown: Progress
+) -> "list[Computed]":
+    """Results of all experiments, by one process or several."""
+    from lumigraph.studies.thesis import run, side_by_side
+
+    quick, fresh = how
+    if workers == 1 or len(chosen) == 1:
+        return run.run(chosen, output, quick=quick, fresh=fresh, progress=shown, finished=_tell)
+    results: list[Computed] = []
+    for results in side_by_side.run_side_by_side(
+        chosen, output, workers, quick=quick, fresh=fresh, finished=_tell
+    ):
+        shown(Stage(0.99 * len(results) / len(chosen), f"{len(results)} of {len(chosen)} experiments"))
+    return results
 
 
 def _check_folder(output: Path) -> None:

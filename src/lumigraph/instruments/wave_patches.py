@@ -1,20 +1,9 @@
-r"""Patch of a camera 2.0 by waves: the size at which tiles of a grating of a frequency meet.
+"""Patch of a camera 2.0 by waves: the size at which tiles of a grating of a frequency meet.
 
-A pixel at y in a micro-image sees the object through the lenslets. The wave that it would send back
-spreads by diffraction, and the rim of the main lens cuts the part that leans outwards: what is left looks, in
-the mean, at a place nearer to the lenslet's axis than the ray through the middle of the lenslet does. So the
-picture in a micro-image is larger than rays have it, the more so the coarser its detail. With the pupil at u,
-the lenslets' transmission A(X), z' from the pupil to the image, L to the lenslets and b on to the sensor,
-
-.. math:: g_y(u) = P(u) e^{i\pi u^2 (1/L - 1/z')/\lambda} \int A(X)
-          e^{i\pi X^2 (1/L + 1/b)/\lambda} e^{-2\pi i X (u/L + y/b)/\lambda} dX
-
-is that wave in the pupil, and
-
-.. math:: T_y = \int g_y(u + \Delta) g_y^*(u - \Delta) du, \quad \Delta = \lambda z' \nu / 2
-
-what the pixel sees of a grating of ν per length of the image. Neighbouring lenslets look at places p z'/L
-apart there: their tiles meet at the patch 2y where the phase of T is π ν p z'/L.
+A pixel sees the object through the lenslets. The wave that it would send back spreads by diffraction, and the
+rim of the main lens cuts the part that leans outwards: what is left looks, in the mean, at a place nearer to
+the lenslet's axis than the ray through the middle of the lenslet does. So the picture in a micro-image is
+larger than rays have it, the more so the coarser its detail.
 """
 
 import math
@@ -40,7 +29,20 @@ LARGEST = 1.5
 
 @dataclass(frozen=True, slots=True)
 class GratingImage:
-    """Image of a grating behind the main lens of a camera 2.0.
+    r"""Image of a grating behind the main lens of a camera 2.0.
+
+    With the pupil at u, the lenslets' transmission A(X), z' from the pupil to the image, L to the lenslets
+    and b on to the sensor, a pixel at y would send back to the pupil
+
+    .. math:: g_y(u) = P(u) e^{i\pi u^2 (1/L - 1/z')/\lambda} \int A(X)
+              e^{i\pi X^2 (1/L + 1/b)/\lambda} e^{-2\pi i X (u/L + y/b)/\lambda} dX
+
+    is that wave in the pupil, and
+
+    .. math:: T_y = \int g_y(u + \Delta) g_y^*(u - \Delta) du, \quad \Delta = \lambda z' \nu / 2
+
+    what the pixel sees of a grating of ν per length of the image. Neighbouring lenslets look at places p z'/L
+    apart there: their tiles meet at the patch 2y where the phase of T is π ν p z'/L.
 
     Parameters
     ----------

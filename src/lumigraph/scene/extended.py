@@ -195,21 +195,64 @@ class ExtendedSource:
         if len(weights) > COMPRESSED:
             needed = np.dtype(dtype).itemsize * len(weights) * math.prod(grid.shape)
             memory.require(needed, "light of the source", "Use fewer pixels of it.", SamplingError)
-        k = 2 * math.pi / wavelength
-        rows, columns = (
-            np.exp(-1j * k * np.outer(axis, sines))
-            for axis, sines in zip((grid.y, grid.x), nodes.T, strict=True)
-        )
-        rows = rows * np.sqrt(weights)
+        rows, columns = _tilts(grid, wavelength, nodes, weights)
         if len(weights) > COMPRESSED:
             data, left = np.einsum("yn,xn->nyx", rows.astype(dtype), columns.astype(dtype)), 0.0
         else:
             data, left = lamps.fewest(rows, columns, accuracy * (1 - QUADRATURE), dtype)
+        return CoherentModes(Field(self._bent(here, data, grid, wavelength), grid, wavelength), error + left)
+
+    def mode_count(self, grid: Grid, wavelength: float, distance: float = 0.0) -> float:
+        """Number of modes that `modes` makes, about: area times solid angle over λ², or waves where many."""
+        waves = self.wave_count(max(grid.size), wavelength, distance)
+        if waves > COMPRESSED / 1.3:  # so many more keep an accuracy of 1e-3
+            return waves
+        return min(waves, self._at(distance).lamp.solid_angle * math.prod(grid.size) / wavelength**2)
+
+    def wave_count(self, reach: float, wavelength: float, distance: float = 0.0, more: int = 0) -> int:
+        """Number of `waves`."""
+        radians = 2 * math.pi / wavelength * reach
+        return len(self._at(distance).lamp.nodes(radians, radians, more)[1])
+
+    def waves(
+        self, grid: Grid, wavelength: float, distance: float, reach: float, more: int = 0
+    ) -> np.ndarray:
+        """Waves (n, y, x), complex64, that have the light's mutual intensity over short distances.
+
+        Parameters
+        ----------
+        grid, wavelength, distance
+            As of `modes`.
+        reach
+            Distance along y and x up to which samples have it [m]; those farther apart interfere by chance.
+        more
+            Another number makes other waves, whose chances are others.
+
+        Raises
+        ------
+        SamplingError
+            They do not fit in memory.
+        """
+        lamps.check(grid, wavelength, 0.5)
+        here, radians = self._at(distance), 2 * math.pi / wavelength * checks.positive("reach", reach)
+        nodes, weights = here.lamp.nodes(radians, radians, more)
+        needed = 16 * len(weights) * math.prod(grid.shape)
+        memory.require(
+            needed, "waves of the source", "Use fewer samples, or a smaller source.", SamplingError
+        )
+        rows, columns = _tilts(grid, wavelength, nodes, weights)
+        data = np.einsum("yn,xn->nyx", rows.astype(np.complex64), columns.astype(np.complex64))
+        return self._bent(here, data, grid, wavelength)
+
+    def _bent(self, here: "ExtendedSource", data: np.ndarray, grid: Grid, wavelength: float) -> np.ndarray:
+        """Waves with the curvature and brightness of a source seen from `here`, in place."""
         if here.distance != math.inf:
             data *= abs(self.distance / here.distance) if self.distance != math.inf else 1.0
-            bent = [np.exp(1j * k / (2 * here.distance) * np.square(axis)) for axis in (grid.y, grid.x)]
-            data *= np.outer(*bent).astype(dtype)
-        return CoherentModes(Field(data, grid, wavelength), error + left)
+            turns = 1j * math.pi / (wavelength * here.distance)
+            data *= np.outer(*(np.exp(turns * np.square(axis)) for axis in (grid.y, grid.x))).astype(
+                data.dtype
+            )
+        return data
 
     def _at(self, distance: float) -> "ExtendedSource":
         """The source as seen from so much farther away."""
@@ -253,3 +296,14 @@ class ExtendedSource:
             f"of {min(max(1 - free / plane / least, accuracy), 1):.2g} could be had; use fewer samples, a "
             "smaller window or source, or TiltedWaves."
         )
+
+
+def _tilts(
+    grid: Grid, wavelength: float, nodes: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Factors along y (ny, waves), weighed, and along x (nx, waves) of waves with these sines."""
+    k = 2 * math.pi / wavelength
+    rows, columns = (
+        np.exp(-1j * k * np.outer(axis, sines)) for axis, sines in zip((grid.y, grid.x), nodes.T, strict=True)
+    )
+    return rows * np.sqrt(weights), columns

@@ -24,6 +24,7 @@ from lumigraph.simulation import error
 from lumigraph.simulation.camera import ImagedCamera
 from lumigraph.simulation.coherence import Coherent, PartiallyCoherent
 from lumigraph.simulation.hiding import hidden_image
+from lumigraph.simulation.lamp_light import in_lamp_light
 
 Part = Slice | Points | Diffuser
 
@@ -112,6 +113,10 @@ def _lit(
     progress: Progress,
 ) -> tuple[np.ndarray, error.ReachedError]:  # fmt: skip
     """Image of a slice in coherent or partially coherent light (ny, nx), and its error."""
+    if isinstance(light, PartiallyCoherent):
+        found = in_lamp_light(camera, part, light, max(accuracy, light.accuracy / 3), progress)
+        if found is not None:
+            return found
     reached = error.of_quadrature("coherent", accuracy).through(camera)
     amplitude = np.sqrt(arrays.to_numpy(part.intensity))
     if not isinstance(light, PartiallyCoherent):

@@ -18,6 +18,7 @@ from lumigraph.studies.thesis import (
     find,
     pages,
     run,
+    side_by_side,
 )
 
 KEYS = {"experiment", "quantity", "unit", "thesis", "expected", "got", "tolerance", "passed", "kind"}
@@ -258,3 +259,14 @@ def test_the_bar_of_some_experiments_goes_from_one_to_the_next_and_never_back(tm
     run.run(chosen, tmp_path, progress=seen.append)
     assert [float(told) for told in seen] == pytest.approx(np.array([0, 1, 2, 2, 3, 4, 4, 5, 6]) / 6)
     assert seen[4].what == "table-9.2: half"
+
+
+def test_two_processes_give_what_one_gives_in_the_order_asked(tmp_path):
+    chosen = find(["2.34", "figure-5.7", "table-5.2"])
+    assert side_by_side.groups(chosen) == [("table-5.2", "figure-5.7"), ("2.34",)]
+    told = []
+    *_, both = side_by_side.run_side_by_side(chosen, tmp_path, 2, quick=True, finished=told.append)
+    assert [one.id for one in both] == [one.id for one in chosen]
+    assert sorted(one.id for one in told) == sorted(one.id for one in chosen)
+    alone = run.run(chosen, tmp_path / "alone", quick=True)
+    assert [one.rows for one in both] == [one.rows for one in alone]

@@ -26,6 +26,7 @@ from lumigraph.metrology.datasheet.charts import ChartExposures, Charts
 from lumigraph.metrology.datasheet.exposures import mean_image
 from lumigraph.metrology.datasheet.planes import is_rendered, scene
 from lumigraph.metrology.datasheet.sheet import ChartPlane, Sheet, SheetEntry
+from lumigraph.metrology.datasheet.stability import stability
 from lumigraph.preparation import decode, prepare, render
 from lumigraph.rendering import refocus
 
@@ -107,6 +108,7 @@ def datasheet(charts: Charts, *, progress: Progress = silent) -> Sheet:
         entries += _times_seen(found, lattice)
     pairs = ((ready(one), ready(other)) for one, other in _pairs(charts.whites))
     entries += _picture_noise(pairs, camera, rendered=rendered)
+    entries += stability(charts.whites, lattice)
     profile = None if edge is None else (edge.position, edge.profile)
     limits = () if camera is None else tuple(_limits(camera))
     notes = [f"lattice: {note}" for note in lattice.notes]

@@ -46,7 +46,7 @@ def is_followed(camera: HasOptics) -> bool:
 
 def coherent_image(
     camera: HasOptics, amplitude: np.ndarray, grid: Grid, dz: float, accuracy: float,
-    progress: Progress = silent,
+    progress: Progress = silent, *, times: int = 1,
 ) -> np.ndarray:  # fmt: skip
     """Raw image (ny, nx) of a plane's complex amplitude (..., y, x), which one wave along the axis has lit.
 
@@ -61,6 +61,8 @@ def coherent_image(
         How far lenslets' light is followed, as for incoherent light.
     progress
         Called as ``progress(fraction)``, with the number of modes and the memory of their light.
+    times
+        Number of such images that are made one after the other, for the time that `progress` is told.
     """
     plain = camera.optics()
     distance, modes = plain.object_distance + dz, np.reshape(amplitude, (-1, *grid.shape))
@@ -70,7 +72,7 @@ def coherent_image(
     lenslets, (rows, columns), (ky, kx) = relay(optics), optics.cells.image, optics.cells.samples
     y, x = lenslets.places(range(rows), range(columns))
     stop = _Stop(plain, distance, grid, _farthest(y, x))
-    lights = stop.lights(modes, within(progress, 0.0, _IN_STOP))
+    lights = stop.lights(modes, within(progress, 0.0, _IN_STOP), times)
     image, rest = np.zeros((rows * ky, columns * kx), np.float32), within(progress, _IN_STOP, 1.0)
     step = max(1, int(rows * TOGETHER / (len(y) * len(x))))
     for first in range(0, rows, step):
@@ -132,23 +134,23 @@ class _Stop:
         """Number of modes and their memory, in words."""
         return f"{count} modes, {memory.told(self.size(count))}" if count > 1 else ""
 
-    def lights(self, modes: np.ndarray, progress: Progress) -> list[np.ndarray]:
+    def lights(self, modes: np.ndarray, progress: Progress, times: int = 1) -> list[np.ndarray]:
         """Light of each of several planes (modes, y, x), where they fit in memory."""
         memory.require(
             self.size(len(modes)), f"light of {len(modes)} modes in the stop",
             "Use fewer modes, a smaller object or a smaller stop.", SamplingError,
         )  # fmt: skip
-        found = [self._first(modes, progress)]
+        found = [self._first(modes, progress, times)]
         for mode in modes[1:]:
             progress(Stage(len(found) / len(modes), self.needs(len(modes))))
             found.append(self.light(mode))
         return found
 
-    def _first(self, modes: np.ndarray, progress: Progress) -> np.ndarray:
+    def _first(self, modes: np.ndarray, progress: Progress, times: int) -> np.ndarray:
         """Light of the first mode, whose time says what all of them take."""
         began = time.perf_counter()
         found = self.light(modes[0])
-        seconds = (time.perf_counter() - began) * len(modes) / _IN_STOP
+        seconds = (time.perf_counter() - began) * len(modes) / _IN_STOP * times
         if len(modes) > 1:
             progress(Needs(0.0, f"{self.needs(len(modes))}, about {max(seconds, 1):.0f} s"))
         return found
