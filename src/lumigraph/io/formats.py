@@ -18,7 +18,7 @@ from lumigraph.core.short_repr import called
 from lumigraph.core.stack import Stack
 from lumigraph.core.volume import Volume
 from lumigraph.errors import FormatError
-from lumigraph.io import source
+from lumigraph.io import source, view_order
 from lumigraph.io.source import MAX_PIXELS
 from lumigraph.io.target import check_target
 
@@ -233,9 +233,7 @@ def open(  # noqa: A001  lumigraph.open is meant to read like the builtin
     given = {"what": what, "page": page, "views": views, "shape": shape, "axes": axes}
     found = _opened(source.existing(path), max_pixels, given)
     if isinstance(found, LightField):
-        from lumigraph.io.view_order import check_order  # SciPy's pictures
-
-        check_order(found, str(path))
+        view_order.check_order(found, str(path))
     if noun is not None and not isinstance(found, noun):
         raise FormatError(f"{path} holds a {called(found)} but must hold a {called(noun)}.")
     return found
