@@ -10,10 +10,10 @@ from data_folder import real
 from lumigraph import viewer
 from lumigraph.calibration import calibrate
 from lumigraph.cli.origin import RawOptions
-from lumigraph.core.prepared import Reason
 from lumigraph.core.stack import Stack
 from lumigraph.deconvolution import Exposure
 from lumigraph.errors import CalibrationError, FormatError, SamplingWarning
+from lumigraph.preparation import Reason
 from lumigraph.preparation.given import read_pages
 
 PITCH, OFFSET = 12.4, 50.0

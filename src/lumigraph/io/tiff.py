@@ -198,7 +198,7 @@ def _of_stack(page: RawImage, planes: ome.OmePlanes | None, told: Declared | Non
 
 def _noun(
     data: np.ndarray, planes: ome.OmePlanes | None, told: Declared | None, first: tifffile.TiffPage
-) -> Stack | Volume:
+) -> RawImage | Stack | Volume:
     found = header.loads(planes.note) if planes is not None else None
     if found is not None:
         return header.restore_planes(data, found)

@@ -71,7 +71,7 @@ def _better(views: LightField[Any]) -> tuple[str, float, float] | None:
     for wide in (True, False):
         if (costs := _compared(views, wide)) is None:
             continue
-        best, given = min(costs, key=lambda order: costs[order]), costs[_GIVEN]
+        best, given = min(costs, key=costs.__getitem__), costs[_GIVEN]
         if costs[best] * _BETTER < given and given > _SEEN:
             return best, costs[best], given
     return None
@@ -142,7 +142,7 @@ def _reduced(view: np.ndarray, step: int) -> np.ndarray:
 
 
 def _detail(grey: np.ndarray) -> np.ndarray:
-    """What a picture shows without its brightness, which vignetting changes from view to view."""
+    """Detail of a picture without its brightness, which vignetting changes from view to view."""
     fine = grey - scipy.ndimage.gaussian_filter(grey, _SMOOTH)
     least = _FLAT * float(np.abs(grey).max())
     return fine / spread if (spread := float(fine.std())) > least else np.zeros_like(fine)

@@ -10,7 +10,7 @@
 - `given`, `calibration_file`: the files that come with a raw image
 """
 
-from lumigraph.core.prepared import PreparedImage
+from lumigraph.core.prepared import PreparedImage, Reason
 from lumigraph.preparation.calibration_file import read_calibration
 from lumigraph.preparation.drift import drift
 from lumigraph.preparation.given import sharp_kinds
@@ -19,6 +19,7 @@ from lumigraph.preparation.vignetting import vignetting
 
 __all__ = [
     "PreparedImage",
+    "Reason",
     "decode",
     "drift",
     "prepare",

@@ -156,7 +156,7 @@ def _beside_fewer(
     """
 
     def again(stage: float) -> None:
-        """What is needed is told once."""
+        """Progress of the second image, without what it needs: that is told once."""
         if not isinstance(stage, Needs):
             share(progress, 1, 2)(stage)
 
