@@ -57,7 +57,7 @@ def test_a_page_of_one_file_and_a_report_are_accessible(browser, views, violatio
     viewer.export([of_views("views", views)], tmp_path / "page.html")
     report = Page("Two pixels", "A report.")
     section = report.section("Numbers").table({"pitch": "14 px"}, caption="Of the lattice")
-    section.figure(np.eye(9), "Nine pixels", zoom=20).lines("a   b")
+    section.figure(np.eye(9), "Nine pixels, higher than the window", zoom=200).lines("a   b")
     (tmp_path / "report.html").write_text(report.html(), "utf-8")
     context = browser.new_context(color_scheme="dark", bypass_csp=True)
     try:
