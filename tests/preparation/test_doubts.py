@@ -117,8 +117,8 @@ def test_views_out_of_order_are_named(turned, told):
     views = [
         [shift(texture, (-2 * r, -2 * c), order=1)[30:130, 30:130] for c in (-1, 0, 1)] for r in (-1, 0, 1)
     ]
-    gains = 1 - 0.3 * np.random.default_rng(1).random((3, 3, 1, 1))  # vignetting
-    views = from_cameras(turned(gains * np.array(views)))
+    levels = 2 * np.random.default_rng(1).random((3, 3, 1, 1))  # not all views are as bright
+    views = from_cameras(turned(np.array(views) + levels))
     if told is not None:
         with pytest.warns(SamplingWarning, match=f"times better with .*{told}"):
             check_order(views, "folder")
