@@ -34,6 +34,15 @@ def test_a_point_on_a_sample_is_the_operators_image_of_it(scope, dz):
     assert raw.pixel_pitch == pytest.approx(12.5e-6)
 
 
+def test_a_white_image_does_not_change_with_finer_points(scope):
+    small = scope.replace(lenslets={"count": (5, 5)}, sensor={"shape": (50, 50)})
+    raw = lg.simulate(small, lg.targets.white(), LIGHT)
+    fine = small.operator((0.0,), 17, accuracy=1e-2)
+    plane = fine.forward(np.ones(fine.shape[1], np.float32))
+    found, expected = (one[20:30, 20:30] / one[20:30, 20:30].mean() for one in (raw.data, plane))
+    assert np.linalg.norm(found - expected) < 0.01 * np.linalg.norm(expected)  # 0.1 by five points a lenslet
+
+
 def test_a_point_between_samples_is_between_their_images(scope):
     grid = scope.object_grid
     at = [scope.point_image(grid.y[12], grid.x[k], 10 * um, accuracy=1e-2) for k in (15, 16)]

@@ -137,8 +137,17 @@ def _image(scope: Microscope, part: Slice | Points | Diffuser, accuracy: float) 
         return _slice_image(scope, part, accuracy)
     if isinstance(part, Points):
         return _points_image(scope, part, accuracy)
-    operator = _operator(scope, 0.0, SAMPLES, accuracy)
+    operator = _operator(scope, 0.0, _even_samples(scope), accuracy)
     return part.intensity * _white(operator), operator.error
+
+
+def _even_samples(scope: Microscope) -> int:
+    """Samples behind a lenslet whose points' images add up to that of an even plane.
+
+    An image's light changes with the point's place by no more than 2 NA / λ: farther apart, points are seen.
+    """
+    band = max(2 * one.numerical_aperture / one.wavelength for one in scope.objectives)
+    return max(SAMPLES, math.floor(scope.lenslet_size * band) + 1)
 
 
 def _points_image(scope: Microscope, part: Points, accuracy: float) -> tuple[np.ndarray, float]:
