@@ -34,6 +34,14 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True)
+class Beside:
+    """Pictures, and a paragraph that stands beside them."""
+
+    text: str
+    pictures: tuple[Picture, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class PageFrame:
     """Another page inside this one, from a file in the same folder."""
 
@@ -50,7 +58,7 @@ class Section:
 
     title: str
     folded: bool = False
-    parts: list[Text | Table | Picture | PageFrame] = field(default_factory=list)
+    parts: list[Text | Table | Picture | Beside | PageFrame] = field(default_factory=list)
 
     def text(self, text: str) -> "Section":
         """Add paragraphs, parted by empty lines."""
@@ -86,6 +94,11 @@ class Section:
     def figure(self, image: Any, caption: str, **options: Any) -> "Section":
         """Add an array (y, x[, 3]), a `RawImage` or a matplotlib figure; options of `pictures.picture`."""
         self.parts.append(picture(image, caption, **options))
+        return self
+
+    def beside(self, text: str, pictures: Iterable[Picture]) -> "Section":
+        """Add pictures with a paragraph beside them; below them on a narrow screen."""
+        self.parts.append(Beside(" ".join(text.split()), tuple(pictures)))
         return self
 
     def frame(self, file: str, title: str) -> "Section":

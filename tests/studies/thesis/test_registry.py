@@ -62,6 +62,13 @@ def test_every_experiment_says_what_it_asks_and_where_it_stands():
         assert one.thesis, one.id
 
 
+def test_every_experiment_says_in_one_sentence_what_the_thesis_shows():
+    for one in experiments():
+        assert one.shows.endswith("."), one.id
+        assert ". " not in one.shows, one.id
+        assert 40 < len(one.shows) < 180, one.id
+
+
 def test_an_id_is_found_by_its_ending_but_not_within_a_number():
     assert [one.id for one in find(["3.12"])] == ["figure-3.12"]
     assert [one.id for one in find(["3.2"])] == ["figure-3.2", "table-3.2"]
@@ -193,12 +200,19 @@ def test_records_have_exactly_the_agreed_keys_and_are_plain_json(tmp_path):
 
 def test_the_report_shows_question_set_up_table_figure_and_why(tmp_path):
     function = one_row(2.0, thesis=5.0, expected=1.0, tolerance=0.5, note="too long")
-    chosen = [Experiment("table-9.1", "A title", "A question?", "Table 9.1", function, "thesis-2f")]
+    chosen = [
+        Experiment(
+            "table-9.1", "A title", "A question?", "Table 9.1", function, "thesis-2f", "A curve falls."
+        )
+    ]
     pages.write_report(chosen, run.run(chosen, tmp_path), tmp_path / "report.html", quick=True)
     text = (tmp_path / "report.html").read_text()
     for part in ("A question?", "camera thesis-2f", "a figure", "FAILS", "too long", "Because.", "1 fail",
                  "Reduced sizes"):  # fmt: skip
         assert part in text
+    beside = text[text.index('<div class="beside">') :]
+    assert beside.index("a figure") < beside.index("In the thesis (Table 9.1): A curve falls.")
+    assert text.count("In the thesis") == 1
     assert "http" not in text.replace("http-equiv", "")
 
 

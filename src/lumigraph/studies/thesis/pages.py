@@ -74,15 +74,18 @@ def counted(results: Sequence[StoredResult]) -> str:
 
 
 def _section(section: report.Section, one: Experiment, result: StoredResult, drawn: dict[str, str]) -> None:
-    """Question, set-up, pictures and rows; each camera is drawn once, where it comes first."""
+    """Question, set-up (a camera is drawn where it comes first), pictures beside the thesis' words, rows."""
     section.text(one.question)
     if one.camera in drawn:
         section.text(f"The set-up is the camera {one.camera}, drawn under {drawn[one.camera]}.")
     elif one.camera:
         section.parts.append(_drawn(one.camera))
         drawn[one.camera] = one.id
-    section.text(f"In the thesis: {one.thesis}.")
-    section.parts += result.pictures
+    there = f"In the thesis ({one.thesis}): {one.shows}" if one.shows else f"In the thesis: {one.thesis}."
+    if result.pictures:
+        section.beside(there, result.pictures)
+    else:
+        section.text(there)
     section.table([cells(row) for row in result.rows], header=HEADER)
     if result.why:
         section.text(f"Why they differ: {result.why}")

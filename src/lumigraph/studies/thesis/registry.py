@@ -193,6 +193,8 @@ class Experiment:
         Takes a `Context`, returns an `ExperimentOutcome`.
     camera
         Name of the bundled camera that it uses, which the report draws; empty for none.
+    shows
+        What that place in the thesis shows, a sentence that the report sets beside the pictures.
     """
 
     id: str
@@ -201,6 +203,7 @@ class Experiment:
     thesis: str
     function: Callable[[Context], ExperimentOutcome]
     camera: str = ""
+    shows: str = ""
 
     @property
     def module(self) -> str:
@@ -228,6 +231,7 @@ def experiment(
     *,
     question: str,
     thesis: str,
+    shows: str = "",
     camera: str = "",
 ) -> Callable[[Function], Function]:
     """Decorator that registers a function of a `Context`; see `Experiment`.
@@ -244,7 +248,7 @@ def experiment(
             raise LumigraphError(
                 f"experiment {id!r} is defined in {known.module} and in {function.__module__}. Rename one."
             )
-        REGISTERED[id] = Experiment(id, title, question, thesis, function, camera)
+        REGISTERED[id] = Experiment(id, title, question, thesis, function, camera, shows)
         return function
 
     return register

@@ -145,6 +145,8 @@ def _raw_modulation(bench: _Bench) -> np.ndarray:
     "The main-lens image by deconvolution",
     question="Which frequencies does Richardson-Lucy bring back that rendering loses, and at what noise?",
     thesis="not in the thesis; its section 5.6 renders by patches",
+    shows="Section 5.6 renders a grating by patches, and what lies above the lenslets' cut-off is lost; it "
+    "deconvolves nothing.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

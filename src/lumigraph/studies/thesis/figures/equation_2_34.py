@@ -28,6 +28,8 @@ WHY = (
     "Step of the multi-step Fresnel method",
     question="Over which distance does one Fresnel step keep the pitch, and what do several steps give?",
     thesis="Section 2.3.1, equation 2.34",
+    shows="A drawing: the distance is divided into steps dz, after each of which samples lie as far apart "
+    "as before.",
 )
 def run(context: Context) -> ExperimentOutcome:
     """The step from the pitch of one Fresnel step; several steps against a spectrum computed here."""

@@ -20,6 +20,8 @@ _CELL = 12  # pixels of the drawing
     "Phase space of a plenoptic camera 1.0",
     question="Which places and directions does each pixel hold, and where is a point among them?",
     thesis="Figures 1.10 and 1.17, equations 1.6 and 1.7",
+    shows="Rays of points in focus, nearer and farther are lines in phase space, and pixels are its cells; "
+    "a rendered pixel sums a column.",
     camera="thesis-plenoptic-1",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -24,6 +24,8 @@ _DIAMETER, _QUICK_DIAMETER = 3.6 * mm, 2.4 * mm
     "Camera view, array view and the rendered picture",
     question="How are places and directions laid out on the sensor, and what is left of the picture's size?",
     thesis="Figures 1.11 to 1.15 and 1.18, equations 1.6 and 1.7",
+    shows="A raw image of lenslets of 20 × 20 pixels, its pixels sorted into an array of views, and the "
+    "rendered picture of 75 × 75 pixels.",
 )
 def run(context: Context) -> ExperimentOutcome:
     """A flat object through the camera of section 1.4.2, decoded and rearranged."""

@@ -24,6 +24,8 @@ _TOLERANCE = {0.5: 0.3, 0.3: 0.1, 0.25: 0.1, 0.1: 0.3}
     "Points of view of a plenoptic camera 2.0",
     question="How many lenslets see one point, and how far do they show it apart?",
     thesis="Figures 1.20 to 1.23",
+    shows="A point's raw image: lit parts of several micro-images, more of them and more displaced the "
+    "lower the magnification.",
     camera="thesis-plenoptic-2-m030",
 )
 def run(context: Context) -> ExperimentOutcome:

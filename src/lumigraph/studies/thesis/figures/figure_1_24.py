@@ -21,6 +21,7 @@ _PLACES = (-60 * um, 0.0, 90 * um)
     "Light field through one lenslet",
     question="Where do rays of the main-lens image go behind a lenslet, and does a wave go there?",
     thesis="Figure 1.24, equations 1.11 to 1.23",
+    shows="One lenslet turns rays at the main-lens image into rays at the sensor, which a matrix describes.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

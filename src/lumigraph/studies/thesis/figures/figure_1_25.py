@@ -24,6 +24,8 @@ _SEEN = 1 / 3  # of the light of the brightest lenslet, or of its width
     "Phase space of a plenoptic camera 2.0",
     question="How do lenslets that relay the image divide places and directions among them?",
     thesis="Figures 1.25 and 1.26, equations 1.8 to 1.10 and 1.20 to 1.23",
+    shows="Two points are columns in phase space, lenslets its slanted bands: three of them sample each "
+    "point's directions.",
     camera="thesis-plenoptic-2-m030",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -25,6 +25,8 @@ WHY = (
     "Phase wrapping of a lens",
     question="How much of the light reaches the focus of a lens at the limit of its sampling?",
     thesis="Figure 2.11, equations 2.90 to 2.95",
+    shows="The quadratic phase of a lens, and the same phase wrapped at 2π, ever more steeply towards the "
+    "rim.",
 )
 def run(context: Context) -> ExperimentOutcome:
     """A one-dimensional lens, its phase sampled, carried to its focus by the angular spectrum."""

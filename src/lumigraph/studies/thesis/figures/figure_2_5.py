@@ -27,6 +27,7 @@ WHY = (
     "Band limits of the transfer function",
     question="Which band of the transfer function is free of aliases, and which does each method keep?",
     thesis="Figure 2.5, equations 2.60 to 2.69",
+    shows="The band of the transfer function that is kept, for three distances: it narrows with distance.",
 )
 def run(context: Context) -> ExperimentOutcome:
     """f_max by 2.60 against the frequency at which the local frequency of the phase is half the window."""

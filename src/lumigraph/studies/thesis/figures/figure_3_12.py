@@ -25,6 +25,7 @@ WHY = (
     "Coherence time of the LED",
     question="How long is the coherence time of an LED at 630 nm of 20 nm bandwidth?",
     thesis="Figure 3.12, equation 3.8",
+    shows="The spectrum of the LED, a peak of 20 nm at 630 nm.",
 )
 def run(context: Context) -> ExperimentOutcome:
     """τ = ∫|γ(t)|² dt, from the transform of an even spectrum and of a Gaussian one."""

@@ -29,6 +29,8 @@ WHY = (
     "SNR against the coherence index",
     question="How incoherent are the random phase masks of C × C sources?",
     thesis="Figures 3.14 and 3.15",
+    shows="Images of a resolution target and their SNR: both improve with the coherence index, up to 250 "
+    "sources.",
     camera=two_f.CAMERA,
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -28,6 +28,8 @@ WHY = (
     "SNR against the number of snapshots",
     question="How many random-phase snapshots make an incoherent image?",
     thesis="Figures 3.16, 3.17 and 3.18",
+    shows="Images of a target, full of speckle after 5 snapshots, and their SNR, which rises to 18 dB at "
+    "350.",
     camera=two_f.CAMERA,
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -26,6 +26,7 @@ WHY = (
     "Image of an edge",
     question="Which intensity has the image of an edge at the edge, in coherent and in incoherent light?",
     thesis="Figure 3.19, section 3.5.3",
+    shows="An edge in coherent light, with fringes beside it, and in incoherent light, without.",
     camera=two_f.CAMERA,
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -37,6 +37,8 @@ WHY = (
     "SNR of the propagation methods against distance",
     question="How near to the exact diffraction pattern of a 5 mm pupil does each method come, at 1 to 10 m?",
     thesis="Figure 3.2",
+    shows="The SNR of the plain angular spectrum falls with distance, and the band-limited methods stay "
+    "above it.",
 )
 def run(context: Context) -> ExperimentOutcome:
     """10 log10(Σ I_ref² / Σ (I - I_ref)²) over a window of 1 cm."""

@@ -24,6 +24,8 @@ WHY = (
     "Diffraction patterns of a pupil",
     question="What does the cross section of the diffraction pattern look like by each method?",
     thesis="Figure 3.3",
+    shows="Diffraction patterns of a pupil by three methods: the plain one is noisy far away, the "
+    "band-limited one loses fringes.",
 )
 def run(context: Context) -> ExperimentOutcome:
     """Rows through the middle of the window, and the exact integral."""

@@ -27,6 +27,8 @@ WHY = (
     "Point image, profiles and spectra",
     question="What does each method make of a point, and which frequencies reach the image?",
     thesis="Figures 3.6 and 3.7, equation 3.2",
+    shows="A point's image, cross section and power spectrum by four methods, beside Airy's pattern and its "
+    "spectrum in red.",
     camera=two_f.CAMERA,
 )
 def run(context: Context) -> ExperimentOutcome:

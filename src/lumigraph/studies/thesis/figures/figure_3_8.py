@@ -27,6 +27,8 @@ _PAD = 3.0
     "Young's slits",
     question="How wide may a lamp be for two slits to make fringes?",
     thesis="Figure 3.8, equations 3.5 and 3.6",
+    shows="A drawing: a square lamp lights two pinholes, whose light makes fringes on a screen if the lamp "
+    "is narrow enough.",
 )
 def run(context: Context) -> ExperimentOutcome:
     """Coherent modes of a lamp through two slits to a screen; the fringes' contrast, by their maxima."""

@@ -18,6 +18,7 @@ _DEPTHS = (-50 * mm, 50 * mm)
     "Refocusing is a shear",
     question="What does refocusing do to the line of a point in phase space, and does light get lost?",
     thesis="Figures 4.13 to 4.16, equations 4.6 to 4.10",
+    shows="A slanted line in phase space becomes another by a shear, with the same area.",
     camera="thesis-plenoptic-1",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -20,6 +20,7 @@ POINTS = {"A": (-3 * mm, -3 * mm, -50 * mm), "B": (0.0, 0.0, 0.0), "C": (3 * mm,
     "Three points at three depths, refocused",
     question="Does refocusing bring the light of one depth together and leave the picture's energy alone?",
     thesis="Figures 4.18, 4.19 and 4.21",
+    shows="A raw image and pictures of three points, one of them sharp and bright in each.",
     camera="thesis-plenoptic-1",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -27,6 +27,8 @@ _PRINTED = {
     "Refocus factor against defocus",
     question="Which α' = F/F' brings an object at Δz from the focused plane into focus?",
     thesis="Figure 4.20, equations 4.12 to 4.14",
+    shows="A curve of the refocus factor over defocus, which rises from below 1 to above it, faster on the "
+    "near side.",
     camera="thesis-plenoptic-1",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -19,6 +19,7 @@ _QUICK = np.array([100, 124.27, 150]) * um
     question="How wide must a lenslet be to keep a point's light in its own micro-image, and what does the "
     "condition promise?",
     thesis="Figure 4.3, equations 4.1 to 4.3",
+    shows="A curve of the smallest lenslet that keeps a point's light, over its focal length.",
     camera="thesis-plenoptic-1",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -18,6 +18,8 @@ PITCHES = {"100 um": 100 * um, "150 um": 150 * um}
     "Raw image of a point with cross-talk",
     question="Where does the light of a point in focus go when its lenslet is too small?",
     thesis="Figures 4.4 and 4.5",
+    shows="A point in focus lights its lenslet and, by diffraction, the neighbours, which widens it in "
+    "phase space.",
 )
 def run(context: Context) -> ExperimentOutcome:
     """Energies under a lenslet and its neighbours, for lenslets below and above the condition."""

@@ -30,6 +30,8 @@ _REAL = ("letters_plenoptic1", "letters_ULF_M1.png", "letters_ULF_M1_white.png")
     question="What does a picture gain in depth of field, and what does it lose, when only some directions "
     "are summed; and how do the points of view differ?",
     thesis="Figures 4.6 to 4.8, equations 4.4 and 4.5",
+    shows="An onion skin rendered from all directions, blurred, and from central pixels alone, sharp at all "
+    "depths.",
     camera="thesis-plenoptic-1",
 )
 def run(context: Context) -> ExperimentOutcome:

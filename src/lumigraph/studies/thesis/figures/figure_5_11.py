@@ -16,6 +16,7 @@ from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, Result
     "Resolution against magnification",
     question="How do the lobe and the cut-off of the rendered picture follow from the magnification?",
     thesis="Figures 5.11 and 5.12, equations 5.16 to 5.19",
+    shows="Curves over the magnification, of the lateral resolution and of the cut-off, which rises.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -13,6 +13,8 @@ from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, Result
     "Two points",
     question="Does the rendered picture still tell two points apart that the main lens just resolves?",
     thesis="Figures 5.17 and 5.18, section 5.5",
+    shows="Two points at Rayleigh's distance are one spot in the rendered picture at m = 0.5, and two at "
+    "twice the distance.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

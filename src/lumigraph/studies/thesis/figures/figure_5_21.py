@@ -27,6 +27,8 @@ _SAMPLES = 21  # of the picture per lenslet
     "A grating of five frequencies",
     question="Which of five frequencies does the rendered picture keep, at m = 0.5, 0.3 and 0.25?",
     thesis="Figures 5.20 to 5.28, Table 5.5, section 5.6",
+    shows="A grating of five frequencies, raw, behind the main lens, rendered and low-passed: high ones are "
+    "lost, more at low magnification.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

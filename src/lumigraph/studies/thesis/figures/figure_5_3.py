@@ -27,6 +27,7 @@ _MOST = 3.0  # um
     "Patches that tile without seams",
     question="How far from its true place does the rendered picture show a point 1 mm off the axis?",
     thesis="Figure 5.3, equations 5.3 to 5.5",
+    shows="A drawing: patches cut from micro-images are turned and set side by side into a picture.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

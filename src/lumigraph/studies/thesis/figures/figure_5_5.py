@@ -22,6 +22,7 @@ _SAMPLES = 21  # of a picture per lenslet
     "Rendering by depth",
     question="Which patch renders a plane out of focus, and what does the picture lose with another one?",
     thesis="Figures 5.4 and 5.5, equations 5.6 to 5.10, section 5.1.3",
+    shows="A curve of the magnification that sets the patch, over the defocus of the object.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -22,6 +22,7 @@ from lumigraph.studies.thesis.registry import (
     "Distances and aperture against magnification",
     question="How do b, a and the main lens' aperture follow from the magnification of the lenslets?",
     thesis="Figures 5.7, 5.8 and 5.9, equations 5.12 to 5.15",
+    shows="Curves of a, b and the aperture of the main lens, for magnifications from 0.1 to 0.5.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -32,6 +32,8 @@ _THRESHOLD, _STOP = 0.5, 0.8
     question="How well does a grid from one row and one column of a white image fit, and what does a grid do "
     "to the picture that is wrong?",
     thesis="Figures 6.10 and 6.12, section 6.4",
+    shows="Cuts through a row and a column of a white image give a grid; one that is off by 15 pixels "
+    "leaves seams in the picture.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -23,6 +23,7 @@ _TURN, _TILT, _MOVE, _SHIFT = math.radians(1.5), math.radians(4.0), 0.4e-3, (12e
     "Misaligned lenslets",
     question="Does a white image tell that the lenslets are shifted, turned, tilted or at a wrong distance?",
     thesis="Figure 6.5, section 6.3",
+    shows="A drawing of four faults of the lenslets before the sensor, which are to be put right by eye.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

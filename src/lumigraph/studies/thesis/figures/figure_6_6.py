@@ -21,6 +21,8 @@ _CASES = {
     "Matching the f-numbers",
     question="Does a white image tell by how much the main lens must be opened or closed?",
     thesis="Figures 6.6 and 6.7, section 6.3",
+    shows="White images with gaps between micro-images, where the main lens is too small, and with "
+    "micro-images that touch.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

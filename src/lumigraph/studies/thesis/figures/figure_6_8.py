@@ -31,6 +31,8 @@ GROUPS = (2, 3)
     question="Which elements of a USAF-1951 target do the pictures of the laboratory camera show, at m = 0.5 "
     "to 0.25?",
     thesis="Figures 6.8, 6.9 and 6.11, sections 6.3 and 6.4",
+    shows="Photographs of a resolution target, raw and rendered, at four magnifications: the lower, the "
+    "more blurred.",
     camera="thesis-prototype",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -27,6 +27,8 @@ WHY = (
     "First minimum of a point image",
     question="Where is the first dark ring of a point's image in the 2f system, by each method?",
     thesis="Table 3.1 and equation 3.3",
+    shows="First dark rings at 67.5 µm by the angular spectrum, and at 77.5 µm by the two band-limited "
+    "methods.",
     camera=two_f.CAMERA,
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -28,6 +28,7 @@ WHY = (
     "Noise and cost of each propagation method",
     question="How far is a point's image from the Airy pattern, and how long does it take?",
     thesis="Table 3.2 and section 3.3.2",
+    shows="Variances of .0012 by the angular spectrum, and of half as much by the band-limited methods.",
     camera=two_f.CAMERA,
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -54,6 +54,7 @@ def airy_in_square(width: float, wavelength: float, f_number: float) -> float:
     question="How far apart do the micro-images stand, and how much of an in-focus point's light stays under "
     "its own lenslet?",
     thesis="Table 4.1, section 4.6",
+    shows="The distances, sizes and numbers of pixels of the camera that chapter 4 simulates.",
     camera="thesis-plenoptic-1",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -32,6 +32,8 @@ PLACES = ((0.0, 0.0), (75 * um, 75 * um), (600 * um, -300 * um))
     question="Which picture of a focal stack is the sharpest, why is it not the one of the point's depth, "
     "and how is that put right?",
     thesis="Table 4.2, figures 4.22 to 4.25",
+    shows="The energy of a spectrum is highest near the point's own α', and estimates miss it by .01 to "
+    ".11, more the farther from focus.",
     camera="thesis-plenoptic-1",
 )
 def run(context: Context) -> ExperimentOutcome:

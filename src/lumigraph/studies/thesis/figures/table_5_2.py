@@ -18,6 +18,8 @@ _EXACT = {0.5: (15.6, 7.8, 2.3077), 0.3: (22.5333, 6.76, 2.6627), 0.25: (26.0, 6
     "Distances and apertures of three magnifications",
     question="Which distances a and b, and which main lens, give lenslet magnifications 0.5, 0.3 and 0.25?",
     thesis="Table 5.2, equations 5.13 to 5.15",
+    shows="Distances a and b and main lenses for magnifications of 0.5, 0.3 and 0.25, to a tenth of a "
+    "millimetre.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

@@ -17,6 +17,8 @@ _PRINTED = {0.5: (78.48, 200.0), 0.3: (68.48, 269.8), 0.25: (65.14, 357.4)}
     question="How wide is the central lobe of a point's image, behind the main lens and in the rendered "
     "picture?",
     thesis="Table 5.3, figures 5.13 to 5.16",
+    shows="Raw and rendered images of a point with artefacts beside the lobe, which is wider, the lower the "
+    "magnification.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

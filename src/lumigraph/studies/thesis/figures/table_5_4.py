@@ -19,6 +19,8 @@ _PAD = 2000  # samples of dark on both sides: frequencies so close that the firs
     "Cut-off of the rendered image",
     question="Up to which frequency does the main lens, and does the rendered picture, show an object?",
     thesis="Table 5.4, figure 5.19",
+    shows="MTFs of the main lens and of the whole system, which ends at a third to a sixth of the main "
+    "lens' cut-off.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:

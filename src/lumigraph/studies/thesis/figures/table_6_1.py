@@ -58,6 +58,7 @@ _ROUNDING = {"F#": 1e-4, "ν main lens": 1e-3, "ν plenoptic": 1e-3}
     "The laboratory camera",
     question="Which distances, f-numbers and cut-offs does each magnification of the laboratory camera have?",
     thesis="Table 6.1, section 6.2",
+    shows="Distances, settings of two stages, f-numbers and cut-offs for magnifications from 0 to 1.",
     camera="thesis-plenoptic-2-m050",
 )
 def run(context: Context) -> ExperimentOutcome:
