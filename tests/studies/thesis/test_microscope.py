@@ -35,6 +35,21 @@ def test_contrast_is_one_on_the_target_itself_and_falls_where_it_is_soft():
     assert usaf.finest_resolved({64.0: 0.1}, usaf.RESOLVED) == 0.0
 
 
+def test_bars_of_a_lenslet_vanish_where_they_fall_on_two():
+    bars = np.tile((np.arange(54) // 9 % 2).astype(float), (18, 1))
+    assert np.array_equal(usaf.one_value_a_lenslet(bars, 9), bars)
+    assert np.ptp(usaf.one_value_a_lenslet(np.roll(bars, 4, 1), 9)[:, 9:45]) == pytest.approx(1 / 9)
+
+
+@pytest.mark.parametrize(
+    ("elements", "passed"),
+    [(-3, (False, False)), (-1, (False, True)), (0, (True, True)), (1, (False, False))],
+)
+def test_a_method_that_is_one_element_finer_fails(elements, passed):
+    seen = 100e3 * 2 ** (elements / 6)
+    assert (usaf.in_focus(seen, 100e3).passed, usaf.off_focus(25 * um, seen, 100e3).passed) == passed
+
+
 @pytest.mark.long
 def test_a_paraxial_model_puts_the_bead_elsewhere():
     scope, rng = _bench.scope(9), np.random.default_rng(3)
