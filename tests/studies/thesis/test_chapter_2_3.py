@@ -5,8 +5,8 @@ import pytest
 
 from lumigraph.analysis import first_zero, rms_error
 from lumigraph.studies.thesis import Context, find
+from lumigraph.studies.thesis.figures import _lamp_edge, figure_2_11, figure_3_11, table_3_1
 from lumigraph.studies.thesis.figures import _two_f as two_f
-from lumigraph.studies.thesis.figures import figure_2_11, figure_3_11, table_3_1
 from lumigraph.studies.thesis.figures._coherence import Errors, Imager, masked, snapshots, white
 
 FIGURES = ("2.4", "2.5", "2.11", "3.2", "3.3", "3.6", "3.8", "3.11", "3.12", "3.15", "3.18", "3.19")
@@ -40,6 +40,16 @@ def test_the_tolerance_of_the_first_zero_tells_methods_apart():
     near = two_f.middle(120e-6)
     cut = two_f.profile(two_f.point_image("corrected band limited")[0])[near]
     assert abs(first_zero(two_f.GRID.x[near], cut) - 48.794e-6) > table_3_1.TOLERANCES[5e-3] * 1e-6
+
+
+def test_a_lamps_edge_lies_between_the_coherent_and_the_incoherent_one():
+    """A point of light: 1/4 at the edge, (1/2 + Si(π)/π)² beside it. A lamp as wide as the lens: 1/3, none."""
+    x = _lamp_edge.places()
+    narrow, wide = _lamp_edge.lamp_edge_theory(1e-4), _lamp_edge.lamp_edge_theory(1.0)
+    assert narrow.max() == pytest.approx((0.5 + 1.8519 / np.pi) ** 2, abs=0.01)  # another plateau, and pixels
+    assert np.interp(0.0, x, narrow) == pytest.approx(1 / 4, abs=0.012)
+    assert np.interp(0.0, x, wide) == pytest.approx(1 / 3, abs=0.012)
+    assert wide[np.abs(x) < 1e-4].max() < 1
 
 
 def test_two_thirds_of_a_lens_of_one_and_a_half_times_the_limit_reach_the_focus():

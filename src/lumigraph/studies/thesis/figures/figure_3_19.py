@@ -9,22 +9,29 @@ from lumigraph.core.field import Field
 from lumigraph.errors import SamplingWarning
 from lumigraph.plots import curves
 from lumigraph.studies.thesis.figures import _two_f as two_f
+from lumigraph.studies.thesis.figures._lamp_edge import lamp_edge, lamp_edge_theory, places
 from lumigraph.studies.thesis.registry import Context, ExperimentOutcome, ResultRow, experiment
 from lumigraph.units import um
 
 METHOD = "band limited, padded"
 PLATEAU = slice(300, 400)
 """Samples from the edge, 1.5 to 2 mm: beyond the ringing, far from the end of the window."""
+LAMPS = (0.25, 0.5, 1.0)
+"""Widths of a lamp, in apertures of the lens."""
+
 WHY = (
     "At the edge the coherent amplitude is half of its plateau, the intensity a quarter; the incoherent "
-    "intensity is a half. The incoherent image is exact: the point image added up over the bright side."
+    "intensity is a half. The incoherent image is exact: the point image added up over the bright side. "
+    "Fringes stand beside the edge as long as a lamp fills a part of the lens. One that fills it, as that of "
+    "chapter 6 more than does, leaves none."
 )
 
 
 @experiment(
     "figure-3.19",
     "Image of an edge",
-    question="Which intensity has the image of an edge at the edge, in coherent and in incoherent light?",
+    question="Which intensity has the image of an edge at the edge, and which fringes has it beside it, in "
+    "coherent light, in that of a lamp, and in incoherent light?",
     thesis="Figure 3.19, section 3.5.3",
     shows="An edge in coherent light, with fringes beside it, and in incoherent light, without.",
     camera=two_f.CAMERA,
@@ -47,10 +54,19 @@ def run(context: Context) -> ExperimentOutcome:
         ResultRow("incoherent image from theory, largest difference near the edge",
             float(np.abs(incoherent - right[1])[near].max()), expected=0.0, tolerance=0.002),
     )  # fmt: skip
+    lamps = {width: (lamp_edge(width), lamp_edge_theory(width)) for width in LAMPS}
+    beside = np.abs(places()) < 100 * um
+    rows += tuple(
+        ResultRow(f"highest beside the edge, lamp {width:g} times as wide as the lens",
+            float(row[beside].max()), expected=float(right[beside].max()), tolerance=0.003,
+            note="over the plateau; mean of tilted waves' edges in closed form")
+        for width, (row, right) in lamps.items()
+    )  # fmt: skip
     edge = (x[near] > 0).astype(float)
     figure = curves(
         x[near] / um,
-        {"edge": edge, "coherent": coherent[near], "incoherent": incoherent[near]},
+        {"edge": edge, "coherent": coherent[near], "incoherent": incoherent[near]}
+        | {f"lamp of {width:g}": (places() / um, row) for width, (row, _) in lamps.items()},
         xlabel="x [µm]",
         ylabel="intensity",
         marks={"edge": 0.0},
