@@ -43,7 +43,7 @@ def test_the_tolerance_of_the_first_zero_tells_methods_apart():
 
 
 def test_a_lamps_edge_lies_between_the_coherent_and_the_incoherent_one():
-    """A point of light: 1/4 at the edge, (1/2 + Si(π)/π)² beside it. A lamp as wide as the lens: 1/3, none."""
+    """A point of light: 1/4 at the edge, (1/2 + Si(π)/π)² beside it. A lamp as wide as the lens: 1/3."""
     x = _lamp_edge.places()
     narrow, wide = _lamp_edge.lamp_edge_theory(1e-4), _lamp_edge.lamp_edge_theory(1.0)
     assert narrow.max() == pytest.approx((0.5 + 1.8519 / np.pi) ** 2, abs=0.01)  # another plateau, and pixels
