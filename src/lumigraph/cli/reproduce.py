@@ -8,7 +8,6 @@ from cyclopts import Parameter
 
 from lumigraph.cli.console import progress
 from lumigraph.cli.options import COMMON, Common, Output
-from lumigraph.core.arrays import WORKERS
 from lumigraph.core.printable import printable
 from lumigraph.core.progress import Progress, Stage
 from lumigraph.core.result import Result
@@ -62,6 +61,7 @@ def reproduce(
     _check_folder(output)
     if workers is not None and workers < 1:
         raise FormatError(f"--workers is {workers} but must be at least 1.")
+    from lumigraph.core.arrays import WORKERS
     from lumigraph.studies.thesis import pages, run
 
     output.mkdir(parents=True, exist_ok=True)
