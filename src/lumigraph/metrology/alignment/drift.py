@@ -11,7 +11,9 @@ from lumigraph.metrology.alignment.setup import shown
 def drift_rates(steps: Sequence[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
     """Drift of what motors move an hour, and its standard deviation, by least squares over the steps.
 
-    What the motors did is taken out: each step's value less all moves before it.
+    What the motors did is taken out: each step's value less all moves before it. The deviation is that of the
+    scatter alone: tilts of a simulated bench that drifted for two hours came out a fifth too small
+    (docs/validation/align.md).
 
     Parameters
     ----------
@@ -45,7 +47,7 @@ def _moved(steps: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
 def drift_table(steps: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     """Drift as rows of text, their header first: what, drift an hour, largest deviation while watched."""
     first = next((k for k, one in enumerate(steps) if one["status"] == "aligned"), 0)
-    rows = [["what", "drift an hour", "standard deviation", "farthest from its place"]]
+    rows = [["what", "drift an hour", "standard deviation, of scatter alone", "farthest from its place"]]
     for name, (rate, error) in drift_rates(steps).items():
         most = max((one["out"][name] for one in steps[first:]), key=abs)
         rows.append([name, shown(name, rate), shown(name, error, signed=False), shown(name, most)])
