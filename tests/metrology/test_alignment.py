@@ -389,7 +389,7 @@ def test_devices_of_a_micro_manager_configuration_are_aligned(camera, stage, pre
     module = ModuleType("seeing_devices")
     eye = Dim(camera.replace(sensor={"shape": (8, 8)}), {}, (), np.random.default_rng(0))
     for name, kind, given in (("XY", unicore._XYStage, list(made.motors)), ("Eye", unicore._Camera, eye)):
-        begun = lambda self, kind=kind, given=given: kind.__init__(self, given)  # noqa: E731
+        begun = lambda self, kind=kind, given=given: kind.__init__(self, given)  # noqa: E731 (one a device)
         setattr(module, name, type(name, (kind,), {"__init__": begun}))
     monkeypatch.setitem(sys.modules, "seeing_devices", module)
     (tmp_path / "bench.cfg").write_text(CONFIGURATION.format(stage=stage, prefix=prefix))

@@ -42,7 +42,8 @@ def date_in(name: str) -> datetime | None:
     """
     for found in _DATE.finditer(name):
         try:
-            return datetime(*(int(part) for part in found.groups() if part is not None))  # type: ignore[arg-type]
+            year, month, day, hour, minute = (int(part or 0) for part in found.groups())
+            return datetime(year, month, day, hour, minute)
         except ValueError:  # digits that are no date
             continue
     return None
